@@ -19,6 +19,8 @@ export class Scene {
   readonly camera = new THREE.PerspectiveCamera(38, 1, 0.05, 120);
   readonly renderer: THREE.WebGLRenderer;
   readonly orbit: OrbitControls;
+  /** Whether processors draw the pictures, which then are not free for anything else. */
+  readonly software: boolean;
   private readonly floor: Floor;
   private readonly sky: THREE.HemisphereLight;
   private readonly sun: THREE.DirectionalLight;
@@ -65,7 +67,8 @@ export class Scene {
     this.orbit.maxDistance = 25;
     this.orbit.addEventListener("change", () => this.invalidate());
     this.look(theme);
-    if (isSoftware(this.renderer.getContext())) this.coarsen(COARSEST);
+    this.software = isSoftware(this.renderer.getContext());
+    if (this.software) this.coarsen(COARSEST);
     this.sizes.observe(canvas.parentElement!);
     this.resize();
     this.next = requestAnimationFrame((now) => this.frame(now));

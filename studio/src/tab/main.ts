@@ -58,6 +58,7 @@ class Page {
     this.player.floor.show(this.project.value.path);
     this.notice.subscribe(() => this.show());
     this.artist.state.subscribe((now, before) => {
+      this.player.working = now.progress !== null;
       if (now.sketch.length) this.player.show(now.sketch);
       else if (now.drawn && now.drawn !== before.drawn) this.drawn();
       else if (before.sketch.length) this.player.show(now.drawn?.clips ?? [], now.drawn?.bodies);

@@ -13,6 +13,9 @@ import { DARK, GHOSTS, LIGHT } from "../stage/theme";
 import type { Character } from "./character";
 import { FloorPath } from "./floor";
 
+/** Milliseconds between pictures while processors have to draw them and the next motion too. */
+const BEAT = 150;
+
 export class Player {
   /** Number of the take that is shown. */
   readonly take = new Signal(0);
@@ -29,6 +32,9 @@ export class Player {
   private acted: Body | null = null;
   private time = 0;
   private playing = true;
+  /** Whether the next motion is being drawn, which needs the processors. */
+  working = false;
+  private waited = 0;
   /** Whether what is shown is a guess that changes. */
   private rough = false;
 
@@ -42,7 +48,7 @@ export class Player {
     this.scene = new Scene(canvas, theme);
     this.cast = new Cast(this.scene.scene, theme);
     this.floor = new FloorPath(this.scene, theme, drawnPath);
-    this.scene.busy = () => this.rough;
+    this.scene.busy = () => this.rough || this.working;
     this.scene.step = (elapsed) => this.step(elapsed);
     this.take.subscribe(() => this.place());
     this.compare.subscribe(() => this.place());
@@ -87,9 +93,13 @@ export class Player {
     this.place();
   }
 
-  private step(elapsed: number): boolean {
+  private step(since: number): boolean {
     const { clip } = this;
     if (!clip || this.floor.active) return false;
+    this.waited += since;
+    if (this.working && this.scene.software && this.waited < BEAT) return false;
+    const elapsed = this.waited;
+    this.waited = 0;
     if (this.playing) {
       this.time = (this.time + elapsed / 1000) % clip.seconds;
       this.place();

@@ -1,12 +1,16 @@
 """The page that needs no server, in a browser."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs
 
 import numpy as np
 import pytest
 
 from motionloom import load
+from motionloom.io.glb import pack_glb
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
@@ -14,6 +18,12 @@ from tests.tab import made
 from tests.tab.tab import Tab
 
 pytestmark = pytest.mark.slow
+
+
+def unpacked(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """The content and the binary part of a GLB."""
+    length = int.from_bytes(data[12:16], "little")
+    return json.loads(data[20 : 20 + length]), data[28 + length :]
 
 
 def test_a_link_is_drawn_on_one_thread_and_again_without_a_network(tab: Tab, prior: Prior, tmp_path: Path):
@@ -101,7 +111,162 @@ def test_a_phone_shows_all_of_it(tab: Tab):
     tab.open((0.5, "a person waves"))
     tab.drawn()
     assert tab.page.evaluate("document.documentElement.scrollWidth") <= 390
-    for name in ("Draw", "BVH", "GLB", "Pause"):
+    for name in ("Draw", "Draw a path", "Own character", "BVH", "GLB", "VRMA", "Pause"):
         box = tab.button(name).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 390
+
+
+def test_a_path_is_drawn_by_pointer_and_followed(tab: Tab, tmp_path: Path):
+    """A line on the floor becomes the way of the pelvis, and is in the address; without it the link is as before."""
+    tab.open((2, "a person walks"), seed=5)
+    tab.drawn()
+    tab.button("Draw a path").click()
+    box = tab.page.locator("#canvas").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.page.mouse.move(x, y + 80)
+    tab.page.mouse.down()
+    for step in range(1, 9):
+        tab.page.mouse.move(x + 10 * step, y + 80 - 14 * step)
+    tab.page.mouse.up()
+    tab.page.wait_for_selector("body[data-state=busy]")
+    tab.drawn()
+    [said] = parse_qs(tab.page.url.partition("#")[2])["p"]
+    points = np.array([[float(x) for x in point.split(",")] for point in said.split()])
+    walked = load(tab.save("bvh", tmp_path)).positions()[:, 0, [0, 2]]
+    assert np.abs(walked[[0, -1]] - points[[0, -1]]).max() < 0.03
+    tab.page.get_by_title("Remove the path").click()
+    tab.page.wait_for_selector("body[data-state=busy]")
+    tab.drawn()
+    assert "p=" not in tab.page.url
+    assert tab.alert() == ""
+    assert not tab.faults
+
+
+def test_all_of_it_by_keyboard(tab: Tab, tmp_path: Path):
+    """Words, a path by arrow keys, playback and a file, without a pointer."""
+    tab.open((2, "a person walks"), seed=5)
+    tab.drawn()
+    keyboard = tab.page.keyboard
+    for _ in range(60):
+        if tab.page.evaluate("document.activeElement.innerText") == "Draw a path":
+            break
+        keyboard.press("Tab")
+    keyboard.press("Enter")
+    for key in ("Enter", "ArrowUp", "ArrowUp", "ArrowUp", "Enter", "ArrowUp", "ArrowUp", "ArrowLeft", "Enter", "Enter"):
+        keyboard.press(key)
+    tab.page.wait_for_selector("body[data-state=busy]")
+    tab.drawn()
+    assert "p=0%2C0+0%2C0.75+0.25%2C1.25" in tab.page.url
+    before = tab.page.evaluate("document.activeElement.id")
+    assert before == "canvas"
+    keyboard.press("Space")
+    assert tab.button("Play").count() == 1
+    tab.button("BVH").focus()
+    with tab.page.expect_download() as file:
+        keyboard.press("Enter")
+    file.value.save_as(tmp_path / "walk.bvh")
+    walked = load(tmp_path / "walk.bvh").positions()[:, 0, [0, 2]]
+    assert np.abs(walked[-1] - [0.25, 1.25]).max() < 0.03
+    assert not tab.faults
+
+
+def test_an_own_character_moves_and_is_saved(tab: Tab, tmp_path: Path):
+    """The figure that the page itself saves, larger and turned, as somebody's own: it goes the same way."""
+    tab.open((1, "a person waves"), seed=2)
+    tab.drawn()
+    plain = load(tab.save("bvh", tmp_path))
+    figure = tab.save("glb", tmp_path)
+    own = tmp_path / "figure.glb"
+    content, binary = unpacked(figure.read_bytes())
+    top = content["scenes"][0]["nodes"]
+    content["nodes"].append({"name": "all", "scale": [1.2, 1.2, 1.2], "rotation": [0, 1, 0, 0], "children": top})
+    content["scenes"][0]["nodes"] = [len(content["nodes"]) - 1]
+    own.write_bytes(pack_glb(content, binary))
+    with tab.page.expect_file_chooser() as chooser:
+        tab.button("Own character").click()
+    chooser.value.set_files(own)
+    tab.page.wait_for_selector("#canvas[data-character=figure]")
+    moved = load(tab.save("glb", tmp_path))
+    pairs = [(plain.skeleton.index(name), moved.skeleton.index(name)) for name in SMPL22.names]
+    apart = [moved.positions()[:, b] - 1.2 * plain.positions()[:, a] for a, b in pairs]
+    assert np.abs(apart).max() < 0.02
+    tab.button("remove").click()
+    assert tab.page.locator("#canvas[data-character]").count() == 0
+    assert not tab.faults
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("chair.glb", b"solid chair", "chair.glb cannot be used: it is no binary glTF; drop a GLB or VRM file."),
+        ("cut.vrm", b"glTF\2\0\0\0\0\1\0\0\xff\0\0\0JSON{}", "cut.vrm cannot be used: its end is missing"),
+    ],
+)
+def test_a_dropped_file_that_is_no_character_is_refused(tab: Tab, name: str, content: bytes, says: str):
+    """In a sentence, and all else stays as it was."""
+    tab.open((0.5, "a person waves"))
+    tab.drawn()
+    tab.page.evaluate(
+        """([name, bytes]) => {
+            const dataTransfer = new DataTransfer();
+            dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
+            document.body.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+        }""",
+        [name, list(content)],
+    )
+    tab.page.wait_for_selector("#notices [role=alert]")
+    assert says in tab.alert()
+    assert tab.button("BVH").count() == 1
+    assert not tab.faults
+
+
+def test_a_vrm_animation_holds_the_motion(tab: Tab, tmp_path: Path):
+    tab.open((1, "a person kicks"), seed=1)
+    tab.drawn()
+    plain, found = load(tab.save("bvh", tmp_path)), load(tab.save("vrma", tmp_path))
+    pairs = [(plain.skeleton.index(name), found.skeleton.index(name)) for name in SMPL22.names]
+    assert max(np.abs(found.positions()[:, b] - plain.positions()[:, a]).max() for a, b in pairs) < 1e-3
+
+
+def test_a_draw_can_be_stopped(tab: Tab):
+    """What was there before is there again, and the next draw is whole; a preview comes after a third of the calls."""
+    tab.open((0.5, "a person waves"), seed=1)
+    tab.drawn()
+    tab.page.get_by_label("Seconds").fill("10")
+    tab.page.get_by_label("Seconds").press("Tab")
+    tab.page.evaluate("performance.clearMarks()")
+    tab.button("Draw").click()
+    tab.page.wait_for_function("performance.getEntriesByName('preview').length > 0")
+    assert float(tab.page.locator("#asked progress").get_attribute("value")) < 0.9
+    tab.button("Stop").click()
+    tab.page.wait_for_selector("body[data-state=drawn]")
+    assert "0.5 s" in tab.page.locator("#player").inner_text()
+    assert tab.page.locator("#says").inner_text() == "stopped"
+    tab.page.get_by_label("Seconds").fill("1")
+    tab.page.get_by_label("Seconds").press("Tab")
+    tab.button("Draw").click()
+    tab.page.wait_for_selector("body[data-state=busy]")
+    tab.drawn()
+    assert "1.0 s" in tab.page.locator("#player").inner_text()
+    assert not tab.faults
+
+
+def test_a_second_tab_draws_beside_the_first(tab: Tab, context, address: str):
+    """It has the weights from the browser's store, and leaves the first one alone."""
+    tab.open((0.5, "a person waves"), seed=1)
+    tab.drawn()
+    other = Tab(context.new_page(), address)
+    other.open((0.5, "a person jumps"), seed=2)
+    other.drawn()
+    assert "jumps" in other.page.url
+    assert "waves" in tab.page.url
+    assert not other.faults
+    assert not tab.faults
+    other.page.close()
+
+
+def test_numbers_in_the_words_are_told(tab: Tab):
+    tab.open((0.5, "a person walks 10 meters"))
+    tab.drawn()
+    assert '"10 meters" is not measured here' in tab.page.locator("#asked").inner_text()
