@@ -1,7 +1,7 @@
 /** A path on the floor: one line of the pointer, or points set by the keyboard, for the motion to follow. */
 
 import * as THREE from "three";
-import type { Place } from "../prior/path";
+import { type Place, even } from "../prior/path";
 import { simplified } from "../project/path";
 import { Line } from "../stage/lines";
 import type { Scene } from "../stage/scene";
@@ -11,6 +11,8 @@ import { FARTHEST, MOST_POINTS } from "./link";
 const HEIGHT = 0.012;
 /** Metres between points of a line, and that an arrow key goes. */
 const [STEP, STRIDE] = [0.03, 0.25];
+/** Where the curve through points is shown. */
+const SHARES = Array.from({ length: 121 }, (_, n) => n / 120);
 /** Metres: a shorter line is a slip of the hand. */
 const SHORTEST = 0.3;
 
@@ -144,7 +146,8 @@ export class FloorPath {
   }
 
   private update(): void {
-    const points = this.drawn?.map(({ x, z }): Place => [x, z]) ?? (this.active ? this.typed : this.points);
+    const set = this.active ? this.typed : this.points;
+    const points = this.drawn?.map(({ x, z }): Place => [x, z]) ?? (set.length > 1 ? even(set, SHARES) : set);
     this.line.through(points.map(([x, z]) => [x, HEIGHT, z] as const));
     const [begin, cursor] = this.marks as [THREE.Mesh, THREE.Mesh];
     begin.visible = points.length > 0;

@@ -249,7 +249,7 @@ class Page {
     return h(
       "div",
       { class: "line" },
-      h("span", { class: "quiet grow" }, floor.active ? FLOOR : path.length ? "Follows its path" : "Path on the floor"),
+      h("span", { class: "quiet grow" }, floor.active ? FLOOR : path.length ? "Path" : "Path on the floor"),
       textButton(floor.active ? "Cancel" : path.length ? "Draw another" : "Draw a path", () => {
         if (floor.active) floor.stop(null);
         else floor.start();

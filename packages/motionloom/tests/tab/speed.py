@@ -1,6 +1,6 @@
-"""How fast the page without a server is: from the address to the first motion, and later ones, in Chromium without a GPU.
+"""How fast the page without a server is: from the address to the first motion, and later ones, in Chromium, no GPU.
 
-    make tab && python benchmarks/tab.py > benchmarks/tab.txt
+    make tab && PYTHONPATH=packages/motionloom python -m tests.tab.speed > benchmarks/tab.txt
 
 On an idle machine. The page says when it is asked, when the preview is there and when the motion (`performance.mark`);
 medians, a new browser profile for each empty cache. Served on localhost, with the headers for threads and without.
@@ -18,10 +18,9 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "packages" / "motionloom"))
-from tests.studio import started  # noqa: E402
+from tests.studio import started
 
+ROOT = Path(__file__).parents[4]
 TIMES = 3
 LINK = "#v=1&seed=1&takes=1&s=5+a+person+walks+forward+and+waves"
 HEADERS = {"Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp"}
