@@ -120,7 +120,7 @@ class Page {
   }
 
   private show(): void {
-    const { progress, says, error, about, drawn } = this.artist.state.value;
+    const { progress, says, error, about, drawn, sketch } = this.artist.state.value;
     const { segments, seed, takes } = this.project.value;
     const message = this.notice.value || error;
     morph(part("top"), [
@@ -188,6 +188,7 @@ class Page {
       ].filter((one): one is HTMLElement => one instanceof HTMLElement),
     );
     document.body.dataset.state = progress === null ? (drawn ? "drawn" : about ? "ready" : "failed") : "busy";
+    document.body.dataset.shown = sketch.length ? "preview" : drawn ? "motion" : "nobody";
     document.body.dataset.threads = String(this.artist.state.value.threads);
   }
 

@@ -58,8 +58,8 @@ def later(page: Any) -> dict[str, float]:
     """Seconds from the button to the preview and the next motion."""
     page.evaluate("performance.clearMarks()")
     page.get_by_role("button", name="other", exact=True).last.click()
-    page.wait_for_function("performance.getEntriesByName('drawn').length > 0")
-    found = page.evaluate(MARKS)
+    while "drawn" not in (found := page.evaluate(MARKS)):
+        page.wait_for_timeout(20)
     return {name: found[name] - found["asked"] for name in ("preview", "drawn")}
 
 
