@@ -40,6 +40,18 @@ export function readPackage(folder: string): Package {
   return { name, version, licence: license, text };
 }
 
+/** Works of others inside of packages, by the file that they are in; their texts lie in `licences`. */
+const INSIDE: Readonly<Record<string, Omit<Package, "text">>> = {
+  "meshopt_decoder.module.js": { name: "meshoptimizer", version: "in three.js", licence: "MIT" },
+};
+
+/** What a module is, if it is somebody else's than its package; null: it is not. */
+export function insidePackage(module: string): Package | null {
+  const found = INSIDE[module.split(/[?]/)[0]!.split(/[\\/]/).at(-1)!];
+  if (!found || !packageFolder(module)) return null;
+  return { ...found, text: readFileSync(join(import.meta.dirname, "licences", `${found.name}.txt`), "utf8").trim() };
+}
+
 /** The page of notices, one package after the other. */
 export function notices(packages: Package[]): string {
   const rule = "-".repeat(80);
@@ -55,15 +67,18 @@ export function thirdPartyNotices(inWorkers: readonly string[] = []): Plugin {
     apply: "build",
     generateBundle(_, bundle) {
       const folders = new Set(inWorkers.map((name) => join(import.meta.dirname, "node_modules", name)));
+      const inside = new Map<string, Package>();
       for (const chunk of Object.values(bundle)) {
         if (chunk.type !== "chunk") continue;
         for (const [id, module] of Object.entries(chunk.modules)) {
           if (module.renderedLength === 0) continue;
           const folder = id.startsWith("\0") ? bundlerFolder(id) : packageFolder(id);
           if (folder) folders.add(folder);
+          const other = insidePackage(id);
+          if (other) inside.set(other.name, other);
         }
       }
-      const packages = [...folders].sort().map(readPackage);
+      const packages = [...[...folders].sort().map(readPackage), ...inside.values()];
       this.emitFile({ type: "asset", fileName: NOTICES, source: notices(packages) });
     },
   };
