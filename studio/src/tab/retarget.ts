@@ -47,6 +47,10 @@ export interface Fit {
   readonly rig: Rig;
   /** The character's leg in lengths of the person's, as big as it is shown. */
   readonly ratio: number;
+  /** By number: each bone at rest in its parent. */
+  readonly local: readonly Pose[];
+  /** Bones whose place in the world says where followers go: those, and what they hang on; parents first. */
+  readonly line: readonly number[];
   /** By how much the file's character is made larger to be shown. */
   readonly size: number;
   /** Per bone that follows: two of the person's joints between which it does, how far, and its turn at their rest. */
@@ -70,7 +74,12 @@ export function fitOf(rig: Rig): Fit {
   const height =
     (head === undefined ? mean(at("left_shoulder"), at("right_shoulder")) : rig.rest[head]!.place)[1] - feet[1];
   const size = height > SHORT && height < TALL ? 1 : PLAIN / Math.max(height, leg);
-  return { rig, ratio: (leg * size) / LEG, size, followers: followersOf(rig, facing) };
+  const followers = followersOf(rig, facing);
+  const local: Pose[] = [];
+  for (const n of rig.order) local[n] = localOf(rig, rig.rest, n);
+  const line = new Set<number>();
+  for (const follower of followers.keys()) for (let n = follower; n >= 0; n = rig.bones[n]!.parent) line.add(n);
+  return { rig, ratio: (leg * size) / LEG, size, followers, local, line: rig.order.filter((n) => line.has(n)) };
 }
 
 const mean = (a: Vec, b: Vec): Vec => scaled(add(a, b), 0.5);
@@ -105,11 +114,12 @@ function followersOf(rig: Rig, facing: Turn): Fit["followers"] {
 
 /** How the file's nodes move; `size` of the fit is for whoever shows it. */
 export function retargeted(body: Body, fit: Fit): Moves {
-  const { rig, followers } = fit;
+  const { rig, followers, local } = fit;
   const [turns, places] = [new Map<number, Turn[]>(), new Map<number, Vec[]>()];
   const seen = placesOf(body);
   const pinned = pinnedOf(rig);
-  const changed = rig.order.filter((n) => followers.has(n) || turnedAtRest(rig, n));
+  const changed = rig.order.filter((n) => followers.has(n));
+  const still = rig.order.filter((n) => !followers.has(n) && turnedAtRest(rig.bones[n]!.turn, local[n]!.turn));
   for (const n of changed) turns.set(n, []);
   for (const n of pinned.keys()) places.set(n, []);
   body.turns.forEach((own, f) => {
@@ -118,6 +128,11 @@ export function retargeted(body: Body, fit: Fit): Moves {
     for (const n of pinned.keys()) places.get(n)!.push(localOf(rig, world, n).place);
   });
   for (const own of turns.values()) unroll(own);
+  for (const n of still)
+    turns.set(
+      n,
+      body.turns.map(() => local[n]!.turn),
+    ); // a finger that the file has in a fist
   return { fps: body.fps, turns, places };
 }
 
@@ -125,8 +140,7 @@ const localOf = (rig: Rig, world: readonly Pose[], n: number): Pose =>
   unhung(rig.bones[n]!.parent < 0 ? WORLD : world[rig.bones[n]!.parent]!, world[n]!);
 
 /** Whether a bone was bound in another turn than the file has it in. */
-function turnedAtRest(rig: Rig, n: number): boolean {
-  const [a, b] = [rig.bones[n]!.turn, localOf(rig, rig.rest, n).turn];
+function turnedAtRest(a: Turn, b: Turn): boolean {
   return Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]) < 1 - 1e-6;
 }
 
@@ -149,7 +163,7 @@ function pinnedOf(rig: Rig): Map<number, string> {
 
 /** All bones in the world in one frame, in the file's own size. */
 function posed(
-  { rig, ratio, size, followers }: Fit,
+  { rig, ratio, size, followers, local, line }: Fit,
   turns: readonly Turn[],
   seen: readonly Vec[],
   pinned: ReadonlyMap<number, string>,
@@ -171,10 +185,9 @@ function posed(
   });
   const ankles = new Map(legs);
   const world: Pose[] = [];
-  for (const n of rig.order) {
-    const bone = rig.bones[n]!;
-    const local = localOf(rig, rig.rest, n);
-    const plain = hung(bone.parent < 0 ? WORLD : world[bone.parent]!, { ...local, turn: local.turn });
+  for (const n of line) {
+    const { parent } = rig.bones[n]!;
+    const plain = hung(parent < 0 ? WORLD : world[parent]!, local[n]!);
     const pin = pinned.get(n);
     world[n] = {
       ...plain,

@@ -78,7 +78,8 @@ export function rigOf(content: Content, bind: ReadonlyMap<number, Pose>): Rig {
   const spine = until(parts.get("left_shoulder")!)
     .filter((n) => arms.includes(n))
     .reverse();
-  const head = parts.get("head");
+  const head = parts.get("head") ?? topOf(bones, order, joints, spine.at(-1));
+  if (head !== undefined) parts.set("head", head);
   const neck =
     head === undefined
       ? []
@@ -87,6 +88,19 @@ export function rigOf(content: Content, bind: ReadonlyMap<number, Pose>): Rig {
           .filter((n) => !spine.includes(n))
           .reverse();
   return { bones, order, rest, parts, spine, neck };
+}
+
+/** The uppermost bone of a neck and head that go on with the spine's names, as Rigify's do; none: there is none. */
+function topOf(
+  bones: readonly Bone[],
+  order: readonly number[],
+  joints: Set<number>,
+  chest?: number,
+): number | undefined {
+  let top: number | undefined;
+  for (let n = chest; n !== undefined; top = n ?? top)
+    n = order.find((k) => joints.has(k) && bones[k]!.parent === n && /spine|neck|head/i.test(bones[k]!.name));
+  return top;
 }
 
 function partsOf(content: Content, names: readonly (readonly [number, string])[]): Map<string, number> {
