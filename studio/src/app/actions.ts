@@ -258,6 +258,7 @@ function project({ app, files, choose, toggleTheme }: Parts): Actions {
     },
     export: { group, label: "Export BVH", keys: ["E"], run: () => void files.export("bvh") },
     exportGlb: { group, label: "Export GLB", keys: ["Shift+E"], run: () => void files.export("glb") },
+    share: { group, label: "Share as a web page", keys: ["Ctrl+E"], run: () => void files.export("html") },
     exportYaml: { group, label: "Export the timeline as YAML", keys: ["Alt+E"], run: () => void files.export("yaml") },
     theme: { group, label: "Dark or light", keys: ["Shift+D"], run: toggleTheme },
     help: { group, label: "Keys", keys: ["?", "F1"], run: () => session.update({ help: !session.value.help }) },

@@ -36,15 +36,17 @@ export class Files {
     }
   }
 
-  async export(format: Format | "yaml" | "project"): Promise<void> {
+  /** `share`: a page that plays it on the project's own character. */
+  async export(choice: Format | "yaml" | "project" | "share"): Promise<void> {
     const { value } = this.app.project;
     const name = fileName(value.name);
     await this.said("Export", async () => {
-      if (format === "project") return saveFile(value, this.app.session.value.stamp);
-      if (format === "yaml") return this.exportYaml(value, name);
+      if (choice === "project") return saveFile(value, this.app.session.value.stamp);
+      if (choice === "yaml") return this.exportYaml(value, name);
       const take = keptTake(value);
       if (!take) throw new Error("there is no motion yet; write what the person does and wait for it to be drawn.");
-      const skeleton = format === "bvh" || format === "glb" ? value.character?.id : undefined;
+      const format = choice === "share" ? "html" : choice;
+      const skeleton = ["bvh", "glb", "share"].includes(choice) ? value.character?.id : undefined;
       const onePerson = format === "bvh" || format === "npz" || (format === "glb" && skeleton !== undefined);
       const people = take.people > 1 && onePerson ? [0, 1] : [undefined];
       for (const person of people) {

@@ -47,7 +47,7 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
       }),
       iconButton(actions.draw!, "draw"),
       iconButton(actions.four!, "grid", { pressed: value.count === 4 }),
-      exportMenu(files),
+      exportMenu(files, value.character !== null),
       iconButton(actions.theme!, "theme"),
       iconButton(actions.help!, "help"),
     ]);

@@ -9,11 +9,14 @@ const EXPORTS = [
   ["mp4", "MP4", "A film"],
   ["png", "PNG", "A sheet of poses"],
   ["npz", "NPZ", "Numbers for Python"],
+  ["html", "Share", "One web page that plays the motion, without a network: send it"],
+  ["share", "Share with your character", "The same, and your character plays it; its file goes along"],
   ["yaml", "Timeline (YAML)", "What the command line runs to the same motion"],
   ["project", "Project file", "Everything on this page"],
 ] as const;
 
-export function exportMenu(files: Files): HTMLElement {
+/** `own`: whether there is a character of one's own. */
+export function exportMenu(files: Files, own: boolean): HTMLElement {
   return h(
     "details",
     { class: "menu", "data-key": "export" },
@@ -21,7 +24,7 @@ export function exportMenu(files: Files): HTMLElement {
     h(
       "div",
       { class: "sheet" },
-      ...EXPORTS.map(([format, name, title]) =>
+      ...EXPORTS.filter(([format]) => own || format !== "share").map(([format, name, title]) =>
         h(
           "button",
           {

@@ -27,7 +27,7 @@ interface MotionJson {
   people: { positions: string; rotations?: string; root?: string }[];
 }
 
-export type Format = "bvh" | "glb" | "npz" | "mp4" | "png";
+export type Format = "bvh" | "glb" | "npz" | "mp4" | "png" | "html";
 
 export async function isUp(): Promise<boolean> {
   try {

@@ -61,7 +61,7 @@ export class Character {
 }
 
 /** Where the bones of the file's skins were bound, in the space of the largest one. */
-function boundIn(gltf: GLTF): Map<number, Pose> {
+export function boundIn(gltf: GLTF): Map<number, Pose> {
   const skeletons: THREE.Skeleton[] = [];
   gltf.scene.traverse((one) => {
     const { skeleton } = one as THREE.SkinnedMesh;
@@ -82,7 +82,7 @@ function boundIn(gltf: GLTF): Map<number, Pose> {
   return found;
 }
 
-function clipOf(gltf: GLTF, { fps, turns, places }: Moves): THREE.AnimationClip {
+export function clipOf(gltf: GLTF, { fps, turns, places }: Moves): THREE.AnimationClip {
   const objects = new Map<number, THREE.Object3D>();
   gltf.scene.traverse((one) => {
     const n = gltf.parser.associations.get(one)?.nodes;

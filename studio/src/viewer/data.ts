@@ -16,7 +16,7 @@ export interface Given {
   readonly takes: readonly GivenTake[];
   /** Metres of which places are whole numbers. */
   readonly unit: number;
-  /** Base64 of a .glb whose animations are those of everybody, take after take; null: mannequins play. */
+  /** Base64 of a deflated .glb whose animations are those of everybody, take after take; null: mannequins play. */
   readonly character: string | null;
 }
 
@@ -42,7 +42,7 @@ export interface Take {
 }
 
 export async function takesOf(given: Given): Promise<Take[]> {
-  const file = given.character === null ? null : await parsed(bytesOf(given.character).buffer);
+  const file = given.character === null ? null : await parsed(await inflated(given.character));
   const read = given.takes.map(async ({ fps, people }) =>
     motionClip(fps, await Promise.all(people.map((one) => placesOf(one, given.unit)))),
   );
@@ -83,8 +83,7 @@ function sampled(actor: Actor, joints: readonly THREE.Object3D[], fps: number): 
  * each joint the changes from frame to frame, of the root's places and of the others' seen from it.
  */
 export async function placesOf({ frames, data }: GivenPerson, unit: number): Promise<Float32Array> {
-  const stream = new Blob([bytesOf(data)]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const bytes = new Uint8Array(await inflated(data));
   const count = frames * POSE;
   if (bytes.length !== count * 4) throw new Error("its numbers are not whole");
   const places = new Float32Array(count);
@@ -99,6 +98,8 @@ export async function placesOf({ frames, data }: GivenPerson, unit: number): Pro
   return places;
 }
 
-function bytesOf(base64: string): Uint8Array<ArrayBuffer> {
-  return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+/** What base64 of deflated bytes was. */
+function inflated(base64: string): Promise<ArrayBuffer> {
+  const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 }

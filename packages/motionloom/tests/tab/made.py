@@ -17,11 +17,14 @@ EXPORT = runpy.run_path(str(ROOT / "tools" / "export_tab.py"))
 
 def node(program: str, *words: str, **settings: str) -> subprocess.CompletedProcess[str]:
     """Run a program of studio/node_modules; skips the test, with the reason, where it is not installed."""
+    return run(str(STUDIO / "node_modules" / program), *words, **settings)
+
+
+def run(script: str, *words: str, **settings: str) -> subprocess.CompletedProcess[str]:
+    """Run a script in Node, with the studio as its folder; skips the test where what it needs is not installed."""
     found = str(NODE) if NODE.is_file() else shutil.which("node")
-    place = STUDIO / "node_modules" / program
-    if found is None or not place.is_file() or not (STUDIO / "node_modules/onnxruntime-web").is_dir():
+    if found is None or not Path(script).is_file() or not (STUDIO / "node_modules/onnxruntime-web").is_dir():
         pytest.skip("the page's packages are not installed (make tab)")
-    command = [found, str(place), *words]
     return subprocess.run(
-        command, cwd=STUDIO, env={**os.environ, **settings}, capture_output=True, text=True, check=False
+        [found, script, *words], cwd=STUDIO, env={**os.environ, **settings}, capture_output=True, text=True, check=False
     )

@@ -22,7 +22,7 @@ ID: Schema = {"type": "string", "pattern": "^[0-9a-f]{16}$"}
 FILE: Schema = {"type": "string", "format": "binary"}
 ANYTHING: Schema = {}
 _NULL: Schema = {"type": "null"}
-FORMATS = ("bvh", "glb", "npz", "mp4", "png")
+FORMATS = ("bvh", "glb", "npz", "mp4", "png", "html")
 """Files that motions are given as."""
 _FLOATS = TEXT | {"description": "base64 of little-endian float32", "contentEncoding": "base64"}
 

@@ -23,6 +23,7 @@ from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
 from motionloom.skeleton import SMPL22
+from motionloom.viz.page import Take, write_page
 
 FORMATS = {
     "bvh": "text/plain; charset=utf-8",
@@ -30,6 +31,7 @@ FORMATS = {
     "npz": "application/octet-stream",
     "mp4": "video/mp4",
     "png": "image/png",
+    "html": "text/html; charset=utf-8",
 }
 ONE_PERSON = ("bvh", "npz")
 UPLOADS = (*(suffix for suffix in readable() if suffix not in (".gltf", ".vrma")), ".json")
@@ -92,7 +94,7 @@ def export(
 ) -> Path:
     """A file of a motion in the project's temporary folder; whoever asks for it removes it.
 
-    kind: of `FORMATS`. skeleton: a name or the id of a character; None: the motion's own. person: one of several,
+    kind: of `FORMATS`. skeleton: a name or the id of a character, which plays an html; None: the motion's own. person: one of several,
     counted from 0; None: all. root: what carries the way over the ground, as ``--root``; None: all joints above the
     hips go along. Raises `Refusal` and `MotionloomError` for what cannot be.
     """
@@ -138,6 +140,8 @@ def _on_character(
     if character is not None and kind == "glb":
         return character.save(moved[0], project.part(suffix), name=caption[:80] or None)
     part = project.part(f".{kind}")
+    if kind == "html":
+        return write_page([Take(caption, moved)], part, character=character)
     return save(moved[0], part, captions=[caption]) if len(moved) == 1 else save_scene(moved, part)
 
 

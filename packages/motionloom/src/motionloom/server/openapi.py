@@ -97,7 +97,7 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
         },
         "/motions/{id}.{format}": {
             "get": _operation(
-                "export_motion", "A motion as bvh, glb, npz, mp4 or png", file, parameters=(one, kind, *options)
+                "export_motion", "A motion as bvh, glb, npz, mp4, png or html", file, parameters=(one, kind, *options)
             )
         },
         "/characters": {

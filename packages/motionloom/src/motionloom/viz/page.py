@@ -154,7 +154,7 @@ def _places(motion: Motion) -> np.ndarray:
 
 
 def _packed(places: Sequence[np.ndarray], step: int) -> list[str]:
-    """For each person base64 of deflated differences from frame to frame: the root's places, the others' from it.
+    """For each person deflated differences from frame to frame: the root's places, the others' from it.
 
     Whole numbers of `UNIT`, joint after joint, all low bytes before all higher ones, so that equal ones are near.
     """
@@ -165,12 +165,12 @@ def _packed(places: Sequence[np.ndarray], step: int) -> list[str]:
         whole = np.rint(kept.reshape(len(kept), -1) / UNIT).clip(-(2**30), 2**30).astype("<i4")
         changes = np.ascontiguousarray(np.diff(whole, axis=0, prepend=0).astype("<i4").T)
         planes = changes.view(np.uint8).reshape(-1, 4).T.tobytes()
-        found.append(base64.b64encode(zlib.compress(planes, 9)).decode())
+        found.append(_deflated(planes))
     return found
 
 
 def _animated(character: Character, people: Sequence[Motion]) -> str:
-    """Base64 of the character's file with these motions as its animations, in their order."""
+    """The character's file with these motions as its animations, in their order, deflated."""
     if ".glb" not in character.suffixes:
         raise MotionloomError(
             f"a page carries a character of one file, a .glb or .vrm; got {character.path}: export it as one"
@@ -178,7 +178,11 @@ def _animated(character: Character, people: Sequence[Motion]) -> str:
     with tempfile.TemporaryDirectory() as folder:
         clips = [(motion, f"motion {number}") for number, motion in enumerate(people)]
         data = character.save_clips(clips, Path(folder) / "character.glb", replace=True).read_bytes()
-    return base64.b64encode(data).decode()
+    return _deflated(data)
+
+
+def _deflated(data: bytes) -> str:
+    return base64.b64encode(zlib.compress(data, 9)).decode()
 
 
 def _filled(template: str, title: str, given: dict) -> str:
