@@ -21,8 +21,8 @@ export const CAMERAS = {
 } as const;
 export type Camera = keyof typeof CAMERAS;
 
-/** Height of the head over the floor that the stage is made for, metres. */
-const TALL = 1.55;
+/** Heights that the stage is made for, metres over the floor: of the head's joint, and of all of a person. */
+const [TALL, TOP] = [1.55, 1.8];
 const RADIANS = Math.PI / 180;
 
 export class ViewStage {
@@ -41,8 +41,7 @@ export class ViewStage {
     this.cast = new Cast(this.scene.scene, theme, Math.max(...takes.map((take) => take.clip?.people.length ?? 0)));
     this.trails = new Trails(this.scene.scene, theme);
     for (const { root } of takes.flatMap((take) => take.actors)) this.scene.scene.add(root);
-    const clip = takes[0]?.clip;
-    this.size = clip ? Math.min(Math.max(jointAt(clip, 0, HEAD, 0)[1] / TALL, 0.1), 10) : 1;
+    this.size = takes[0] ? sizeOf(takes[0]) : 1;
     this.scene.orbit.minDistance = 0.8 * Math.min(this.size, 1);
     this.scene.orbit.target.y *= this.size;
     this.scene.step = (elapsed) => this.step(elapsed);
@@ -116,6 +115,16 @@ export class ViewStage {
     this.scene.centre(x, z, follow && clip !== null, 1 - Math.exp(-elapsed / 220));
     return playing || before.distanceToSquared(this.scene.orbit.target) > 1e-7;
   }
+}
+
+/** How large people are, as the mannequin is 1; a character may have a large head, a hat or ears. */
+function sizeOf({ clip, actors }: Take): number {
+  if (!clip) return 1;
+  const head = jointAt(clip, 0, HEAD, 0)[1] / TALL;
+  const room = new THREE.Box3();
+  for (const { root } of actors) room.expandByObject(root);
+  const top = room.isEmpty() ? 0 : (room.max.y - room.min.y) / TOP;
+  return Math.min(Math.max(head, Math.min(top, 3 * head), 0.1), 10);
 }
 
 /** Between the pelvises of everybody, over the floor. */

@@ -18,9 +18,12 @@ from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
 from motionloom.skeleton import SMPL22
+from motionloom.viz import page
 from tests.io.rigged import Hero
 from tests.io.test_bind_pose import place
 from tests.server.serving import Server, decoded
+from tests.viz.test_page import TEMPLATE, Reader
+from tests.viz.test_video import standing
 
 
 def fetched(server: Server, path: str, place: Path) -> Path:
@@ -84,6 +87,22 @@ def test_the_way_is_carried_by_what_is_asked(tmp_path: Path) -> None:
     for skeleton, mode in ((None, "hips"), ("unreal", "feet")):
         with pytest.raises(Refusal, match=f"a root is one of motion, hips, in-place.*got '{mode}'"):
             export(project, stored, "npz", skeleton=skeleton, person=None, root=mode)
+
+
+def test_a_page_plays_it_with_a_character_of_ones_own_if_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a server, and with a stand-in for the viewer."""
+    viewer = tmp_path / "viewer.html"
+    viewer.write_text(TEMPLATE)
+    monkeypatch.setattr(page, "VIEWER", viewer)
+    project = Project(tmp_path / "project", Limits())
+    stored = project.add((standing(20), standing(20, speed=1.0)), {"prompt": "two <people>"})
+    own = project.add_character(Hero().write(project.part(".glb")), "hero.glb", ".glb")
+    for skeleton, person, people in ((None, None, 2), (None, 1, 1), ("mixamo", None, 2), (own, None, 2), (own, 0, 1)):
+        file = export(project, stored, "html", skeleton=skeleton, person=person)
+        given = Reader(file.read_text()).given
+        [take] = given["takes"]
+        assert (take["name"], len(take["people"])) == ("two <people>", people)
+        assert (given["character"] is not None) == (skeleton == own)
 
 
 def test_both_people_of_a_duet_are_in_one_file_or_alone(server: Server, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import load
+from tests.io.rigged import Hero
 from tests.studio.studio import Studio
 
 
@@ -23,6 +24,32 @@ def test_a_bvh_comes_out_and_goes_in_again(studio: Studio, tmp_path: Path):
     studio.page.locator(".clip select").select_option(index=1)
     project = studio.project()
     assert project["takes"][0]["how"] == "from a file"
+
+
+def test_a_motion_is_shared_as_a_page(studio: Studio, browser, tmp_path: Path):
+    """One file, which plays without a network; with a character of one's own if asked."""
+    page = studio.page
+    assert page.locator(".sheet .row", has_text="Share with your character").count() == 0, "there is none"
+    plain = studio.download("Control+e")
+    studio.drop(Hero().write(tmp_path / "hero.glb"))
+    page.wait_for_selector("#canvas[data-character]")
+    own = studio.export("Share with your character")
+    assert len(plain) < 1_500_000
+    assert len(own) > len(plain)
+    context = browser.new_context(viewport={"width": 480, "height": 360}, offline=True, reduced_motion="reduce")
+    for number, data in enumerate((plain, own)):
+        file = tmp_path / f"shared {number}.html"
+        file.write_bytes(data)
+        shown = context.new_page()
+        faults: list[str] = []
+        shown.on("pageerror", lambda error, faults=faults: faults.append(str(error)))
+        shown.goto(file.as_uri())
+        shown.wait_for_selector("body[data-ready]", timeout=240_000)
+        assert shown.title() == "a person walks forward"
+        assert shown.locator(".clock").inner_text() == "0.00 / 2.00 s"
+        assert not faults
+        shown.close()
+    context.close()
 
 
 def test_the_export_menu_stays_open_while_the_page_changes_behind_it(studio: Studio):

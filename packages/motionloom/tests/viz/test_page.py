@@ -174,6 +174,33 @@ def test_a_character_comes_with_its_motions(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("viewer")
+def test_a_characters_own_animations_take_no_room(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).normal(scale=0.3, size=(2000, 22, 3))
+    sizes = []
+    for hero in (Hero(seed=4), Hero(seed=4).clip("sway", noise)):
+        character = load_character(hero.write(tmp_path / "hero.glb"))
+        moved = retarget(standing(20), character.skeleton)
+        given = Reader(page.page([page.Take("", [moved])], character=character)).given
+        shown = tmp_path / "shown.glb"
+        shown.write_bytes(zlib.decompress(base64.b64decode(given["character"])))
+        assert np.abs(io.load(shown).positions() - moved.positions()).max() < 1e-3
+        corners = [one.surfaces()[0].points for one in (load_character(shown), character)]
+        assert np.abs(corners[0] - corners[1]).max() < 1e-6
+        sizes.append(len(given["character"]))
+    assert sizes[1] < sizes[0] + 6000
+    assert shown.stat().st_size > sizes[1] + 500_000
+
+
+@pytest.mark.usefixtures("viewer")
+def test_a_character_that_is_packed_is_refused(tmp_path: Path) -> None:
+    hero = Hero()
+    hero.json["extensionsRequired"] = hero.json["extensionsUsed"] = ["EXT_meshopt_compression"]
+    character = load_character(hero.write(tmp_path / "hero.glb"))
+    with pytest.raises(MotionloomError, match="cannot unpack EXT_meshopt_compression.*hero.glb"):
+        page.page([page.Take("", [retarget(standing(4), character.skeleton)])], character=character)
+
+
+@pytest.mark.usefixtures("viewer")
 def test_view_puts_motions_on_a_character(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,6 +8,7 @@ import base64
 import html
 import json
 import math
+import struct
 import tempfile
 import warnings
 import zlib
@@ -38,6 +39,8 @@ UNIT = 0.00025
 """Metres: places are whole numbers of it."""
 _MOTION = '<script type="application/json" id="motion">', "</script>"
 _TITLE = "<title>motionloom</title>"
+_PACKED = {"EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_texture_basisu"}
+_MATRICES = ("inverseBindMatrices", "extensions")
 
 
 @dataclass(frozen=True)
@@ -175,10 +178,43 @@ def _animated(character: Character, people: Sequence[Motion]) -> str:
         raise MotionloomError(
             f"a page carries a character of one file, a .glb or .vrm; got {character.path}: export it as one"
         )
+    before = character.file.document.json
+    if packed := sorted(_PACKED.intersection(before.get("extensionsRequired", []))):
+        raise MotionloomError(f"a page cannot unpack {packed[0]}, which {character.path} needs; export it without it")
     with tempfile.TemporaryDirectory() as folder:
         clips = [(motion, f"motion {number}") for number, motion in enumerate(people)]
         data = character.save_clips(clips, Path(folder) / "character.glb", replace=True).read_bytes()
-    return _deflated(data)
+    return _deflated(_without(data, before.get("animations", [])))
+
+
+def _without(data: bytes, animations: Sequence[dict]) -> bytes:
+    """A .glb with zeros, which take no room deflated, where only animations have their numbers that it lost."""
+    (length,) = struct.unpack_from("<I", data, 12)
+    document = json.loads(data[20 : 20 + length])
+    views, accessors = document.get("bufferViews", []), document.pop("accessors", [])
+    used = _numbers(document.get("meshes")) | _numbers([document.get("skins"), document["nodes"]], _MATRICES)
+    lost = _numbers(list(animations), ("samplers",)) - _numbers(document["animations"], ("samplers",)) - used
+    kept = _numbers([one for number, one in enumerate(accessors) if number not in lost], ("bufferView",))
+    kept |= _numbers(document, ("bufferView",))
+    if any(view.get("extensions") or view.get("buffer", 0) for view in views):
+        return data
+    empty = np.zeros(len(data), bool)
+    for keep in (False, True):
+        for number, view in enumerate(views):
+            if (number in kept) == keep:
+                start = 28 + length + view.get("byteOffset", 0)
+                empty[start : start + view["byteLength"]] = not keep
+    return np.where(empty, np.uint8(0), np.frombuffer(data, np.uint8)).tobytes()
+
+
+def _numbers(found: object, keys: Sequence[str] = ()) -> set[int]:
+    """Whole numbers anywhere in JSON, or those of some keys alone."""
+    if isinstance(found, dict):
+        inside = (_numbers(value, () if key in keys else keys) for key, value in found.items())
+        return set().union(*inside)
+    if isinstance(found, list):
+        return set().union(*(_numbers(value, keys) for value in found))
+    return {found} if isinstance(found, int) and not keys else set()
 
 
 def _deflated(data: bytes) -> str:
