@@ -168,15 +168,23 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Write a prior's weights beside the page that draws with them.")
     parser.add_argument("folder", type=Path, help="where the page was built")
     parser.add_argument("--weights", default="default", help="a weight file or the name of one that ships")
+    parser.add_argument(
+        "--alone", action="store_true", help="prior.bin and prior.json only, into a new folder: docs/javascript.md"
+    )
     parser.add_argument("--precise", action="store_true", help="float16 throughout: exact, and a third larger")
     said = parser.parse_args()
     try:
-        if not (said.folder / "index.html").is_file():
-            raise MotionloomError(f"there is no page in {said.folder}; build it by 'make tab'")
+        if said.alone and said.folder.exists():
+            raise MotionloomError(f"{said.folder} is there already; name a new folder")
+        if not said.alone and not (said.folder / "index.html").is_file():
+            raise MotionloomError(f"there is no page in {said.folder}; build it by 'make tab', or say --alone")
         path = find_weights(said.weights)
-        about = export(load_prior(path), weights_digest(path), said.folder, precise=said.precise)
-        copy_notices(said.folder)
-        keep_offline(said.folder)
+        prior = load_prior(path)
+        said.folder.mkdir(parents=True, exist_ok=True)
+        about = export(prior, weights_digest(path), said.folder, precise=said.precise)
+        if not said.alone:
+            copy_notices(said.folder)
+            keep_offline(said.folder)
     except MotionloomError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -17,6 +17,8 @@ import { type App, fail } from "./app";
 import type { Deeds } from "./deeds";
 
 const MOTIONS = [".bvh", ".amc", ".npz", ".glb", ".asf"];
+/** Bytes of a page from which on its size is said. */
+const LARGE = 1_500_000;
 const GLB_MAGIC = 0x46546c67;
 
 export class Files {
@@ -52,6 +54,10 @@ export class Files {
       for (const person of people) {
         const blob = await bytes(motionFile(take.motion, format, { skeleton, person }));
         download(blob, `${name}${person === undefined ? "" : `_${person + 1}`}.${format}`);
+        if (choice === "share" && blob.size > LARGE)
+          this.app.session.update({
+            told: `The page has ${(blob.size / 1e6).toFixed(1)} MB with your character in it.`,
+          });
       }
     });
   }

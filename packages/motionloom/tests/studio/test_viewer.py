@@ -181,10 +181,23 @@ def test_the_web_component_plays_a_file(browser, tmp_path: Path) -> None:
         page.keyboard.press("g")
         assert first.locator(".plot polyline").count() == 1
         second.locator("[role=alert]", has_text="answered with 404").wait_for()
+        page.set_content(cell(tmp_path))
+        page.locator("motionloom-viewer .clock").wait_for()
+        assert page.locator("motionloom-viewer").evaluate("viewer => viewer.duration") == pytest.approx(2.0, abs=0.1)
     finally:
         page.close()
         server.shutdown()
         server.server_close()
+
+
+def cell(folder: Path) -> str:
+    """What the notebook cell of docs/view.md shows."""
+    text = (Path(__file__).parents[4] / "docs/view.md").read_text()
+    [source] = [part.split("```")[0] for part in text.split("```python\n") if "IPython" in part]
+    source = source.replace("from IPython.display import HTML", "").replace("HTML(", "found = (")
+    names: dict[str, str] = {}
+    exec(source.replace('Path("', f'Path("{folder}/'), names)
+    return names["found"]
 
 
 class Quiet(SimpleHTTPRequestHandler):

@@ -52,3 +52,12 @@ def test_a_folder_without_the_page_is_refused(tmp_path: Path, monkeypatch, capsy
     assert made.EXPORT["main"]() == 2
     assert "build it by 'make tab'" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_weights_alone_go_into_a_new_folder(tmp_path: Path, monkeypatch, capsys):
+    folder = tmp_path / "a" / "weights"
+    monkeypatch.setattr("sys.argv", ["export_tab.py", str(folder), "--alone"])
+    assert made.EXPORT["main"]() == 0
+    assert {path.name for path in folder.iterdir()} == {"prior.bin", "prior.json"}
+    assert made.EXPORT["main"]() == 2
+    assert "name a new folder" in capsys.readouterr().err

@@ -105,9 +105,9 @@ class Assistant:
     ) -> dict[str, Any]:
         """Write a motion to a file in the project folder and give its path.
 
-        motion: an id that another tool gave. format: bvh, glb, npz, mp4, png, or html: one page that plays it. skeleton:
-        smpl22, mixamo, unreal, vrm or rigify. root: what carries the way on a skeleton with a root bone: motion (that bone), hips
-        or in-place (nothing). name: of the file, letters, digits, - and _ only; without it the motion's id.
+        motion: an id that another tool gave. format: bvh, glb, npz, mp4, png, or html, a page that plays it. skeleton:
+        smpl22, mixamo, unreal, vrm or rigify. root: what carries the way on a skeleton with a root bone: motion (that
+        bone), hips or in-place (nothing). name: of the file, letters, digits, - and _ only; without it the motion's id.
         """
         import anyio
 

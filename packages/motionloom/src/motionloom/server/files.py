@@ -94,9 +94,9 @@ def export(
 ) -> Path:
     """A file of a motion in the project's temporary folder; whoever asks for it removes it.
 
-    kind: of `FORMATS`. skeleton: a name or the id of a character, which plays an html; None: the motion's own. person: one of several,
-    counted from 0; None: all. root: what carries the way over the ground, as ``--root``; None: all joints above the
-    hips go along. Raises `Refusal` and `MotionloomError` for what cannot be.
+    kind: of `FORMATS`. skeleton: a name or the id of a character, which plays an html; None: the motion's own.
+    person: one of several, counted from 0; None: all. root: what carries the way over the ground, as ``--root``; None:
+    all joints above the hips go along. Raises `Refusal` and `MotionloomError` for what cannot be.
     """
     if root is not None and (skeleton is None or root not in MODES):
         raise Refusal(400, f"a root is one of {', '.join(MODES)}, for a skeleton that is named; got {root[:20]!r}")
