@@ -35,6 +35,8 @@ type Graph = "text" | "bind" | "prior";
 export class Network {
   private readonly pieces: WordPiece;
   private readonly nothing: Promise<Asked>;
+  /** The call that was made last. */
+  private last: Promise<unknown> = Promise.resolve();
 
   private constructor(
     private readonly ort: Runtime,
@@ -67,7 +69,7 @@ export class Network {
     const places = this.packed.tensor("text.places.weight");
     pieces.forEach((value, n) => (pieces[n] = value + places[n]!));
     const width = pieces.length / ids.length;
-    const { states } = await this.sessions.text.run({
+    const { states } = await this.run("text", {
       pieces: this.floats(pieces, [1, ids.length, width]),
       mask: this.flags(
         ids.map(() => true),
@@ -89,7 +91,7 @@ export class Network {
   }
 
   private async bound(pooled: Float32Array, tokens: Float32Array, words: number): Promise<Asked> {
-    const { text, keys, values } = (await this.sessions.bind.run({
+    const { text, keys, values } = (await this.run("bind", {
       pooled: this.floats(pooled, [1, pooled.length]),
       tokens: this.floats(tokens, [1, words, pooled.length]),
     })) as Record<string, Numbers>;
@@ -129,7 +131,7 @@ export class Network {
       }
     });
     const head = [count, layers, heads, words, inner];
-    const { clean } = (await this.sessions.prior.run({
+    const { clean } = (await this.run("prior", {
       state: this.floats(state, [count, tokens, token]),
       level: new this.ort.Tensor(
         "int64",
@@ -150,6 +152,13 @@ export class Network {
       valid: this.flags(each(lengths, tokens), [count, tokens]),
     })) as { clean: Numbers };
     return rows.map((row, n) => clean.data.slice(n * tokens * token, n * tokens * token + row.state.length));
+  }
+
+  /** One call after the other: ONNX Runtime Web mixes up the memory of calls that overlap, of whichever graph. */
+  private run(graph: Graph, given: InferenceSession.FeedsType): Promise<InferenceSession.ReturnType> {
+    const made = this.last.then(() => this.sessions[graph].run(given));
+    this.last = made.catch(() => undefined);
+    return made;
   }
 
   private floats(data: Float32Array, shape: number[]): Tensor {

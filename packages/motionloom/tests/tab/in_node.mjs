@@ -11,6 +11,10 @@ for (const [n, { words, ...options }] of requests.entries()) {
   const motion = await prior.generate(words, { ...options, progress: () => (calls += 1) });
   for (const name of ["features", "positions", "rotations"]) writeFileSync(`${folder}/${n}.${name}`, motion[name]);
   if (n === 0) writeFileSync(`${folder}/${n}.bvh`, motion.bvh());
+  if (n === 0) {
+    const [same] = await Promise.all([prior.generate(words, options), prior.generate("she jumps", { seconds: 1 })]);
+    if (!same.positions.every((place, k) => place === motion.positions[k])) throw new Error("two at once are mixed up");
+  }
   if (calls !== 24 || motion.frames !== motion.positions.length / 66) throw new Error(`${calls} calls`);
 }
 const failed = {};

@@ -1,6 +1,7 @@
 """The page that needs no server, in a browser."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,23 @@ def test_words_takes_and_what_comes_next_by_keyboard(tab: Tab):
     assert "s=2+a+person+waves&s=2+a+person+jumps" in tab.page.url
     assert "4.0 s" in tab.page.locator("#player").inner_text()
     assert not tab.faults
+
+
+def test_a_link_is_the_same_motion_elsewhere(tab: Tab, browser, address: str, tmp_path: Path):
+    """Two sentences along a path, opened by somebody whose browser keeps nothing of it."""
+    tab.open((2, "a person walks & waves #1"), (2, "100 % jumping"), seed=2**40 - 1, p="1,1 1,2.5 2,3.25")
+    tab.drawn()
+    first, link = load(tab.save("bvh", tmp_path)), tab.page.url
+    assert re.search(r"[&#]w=[0-9a-f]{12}(&|$)", link)
+    context = browser.new_context(accept_downloads=True)
+    other = Tab(context.new_page(), address)
+    other.page.goto(link)
+    other.drawn()
+    assert other.alert() == ""
+    again = load(other.save("bvh", tmp_path))
+    assert np.abs(again.positions() - first.positions()).max() < 0.02
+    assert np.abs(first.root[0, [0, 2]] - 1.0).max() < 0.05
+    context.close()
 
 
 def test_other_weights_are_told(tab: Tab):
