@@ -13,7 +13,7 @@ from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.skeleton import SMPL22
 from tests.robots import models
-from tests.robots.people import marching
+from tests.robots.people import marching, stepping_aside
 from tests.shared import shared
 
 pytest.importorskip("mink")
@@ -21,7 +21,7 @@ pytest.importorskip("mink")
 from motionloom.robots.body import Robot, read_robot, to_motion
 from motionloom.robots.clip import Clip, put_on_robot
 from motionloom.robots.figures import measure
-from motionloom.robots.files import load_clip, save_clip
+from motionloom.robots.files import load_clip, load_motion, save_clip
 from motionloom.robots.physics import track
 
 RECORDINGS = ("data/cmu/bvh/07_04.bvh", "data/cmu/asf_amc/135/135_04.amc")
@@ -74,6 +74,24 @@ def test_ankles_of_one_hinge_are_enough(tmp_path: Path) -> None:
     figures = measure(put_on_robot(marching(0.8), robot), robot)
     assert figures.limits_broken == 0
     assert max(figures.float_cm, figures.slide_cm) < 0.3
+
+
+@pytest.mark.parametrize("path", [None, ROBOTS[0]], ids=["tin", "g1"])
+def test_wide_steps_to_the_side_stand_on_the_edges_of_soles(path: str | None, robot: Robot) -> None:
+    """Where ankles roll no further, soles stand on their inner edge, and neither slide nor let the legs swing about."""
+    robot = robot if path is None else read_robot(shared(path))
+    made = put_on_robot(stepping_aside(1.3), robot)
+    figures = measure(made, robot)
+    assert figures.faults() == []
+    assert max(figures.float_cm, figures.slide_cm) < 0.1
+    assert figures.largest_step < 0.1
+    assert figures.sole_roll > 0.1
+    places = to_motion(robot, made.qpos, made.fps).positions()
+    ankles = [places[:, robot.skeleton.index(f"{side}_ankle"), 0] for side in ("left", "right")]
+    legs = 2 * robot.skeleton.offsets[robot.skeleton.index("left_knee"), 1]
+    assert (ankles[0] - ankles[1]).max() > 1.1 * abs(legs)  # as wide as was asked: 1.3 radians
+    level = measure(put_on_robot(stepping_aside(0.5), robot), robot)
+    assert level.sole_roll < 0.02
 
 
 def test_the_root_does_not_jump_to_feet_that_are_late(robot: Robot) -> None:
@@ -230,6 +248,27 @@ def test_the_command_line_writes_checks_and_reads_back(
     for line in (["info", str(out)], ["export", str(source), str(out), "--max-speed", "3"]):
         assert main(line) == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".glb"])
+def test_files_of_poses_hold_the_robot(
+    suffix: str, robot: Robot, clip: Clip, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A person's motion becomes the robot's, whatever the format; what is read from joint angles stays as it was."""
+    source, model = io.save(marching(), tmp_path / "march.bvh"), ["--robot", str(robot.file.path)]
+    out = tmp_path / f"robot{suffix}"
+    assert main(["export", str(source), str(out), *model]) == 0
+    assert f"{len(clip)} frames" in capsys.readouterr().out
+    made, asked = io.load(out), to_motion(robot, clip.qpos, clip.fps)
+    assert (made.fps, len(made)) == (pytest.approx(50), len(clip))
+    hand = made.skeleton.index("left_wrist"), asked.skeleton.index("left_wrist")
+    assert np.abs(made.positions()[:, hand[0]] - asked.positions()[:, hand[1]]).max() < 0.02
+    angles = save_clip(clip, robot, tmp_path / "march.csv", header=False)
+    assert main(["export", str(angles), str(out), *model, "--source-fps", "25", "--force"]) == 0
+    back = io.load(out)
+    assert (back.fps, len(back)) == (pytest.approx(25), len(clip))
+    motion = load_motion(angles, robot.file.path, fps=25)
+    assert np.abs(back.positions()[:, hand[0]] - motion.positions()[:, hand[1]]).max() < 0.01
 
 
 @pytest.mark.parametrize("path", ROBOTS, ids=["g1", "t1"])

@@ -20,7 +20,7 @@ from tests.live import people
 from tests.live.people import QUICK
 from tests.live.test_socket import Client, talk
 from tests.robots import models
-from tests.robots.people import marching
+from tests.robots.people import marching, stepping_aside
 from tests.shared import shared
 
 pytest.importorskip("mink")
@@ -66,6 +66,13 @@ def test_a_march_is_followed_within_every_limit(robot: Robot) -> None:
     assert not clip.planted[13, 0].any()
     assert np.abs(np.diff(clip.qpos[:, :3], axis=0)).max() < 0.03
     assert np.array_equal(followed(marching(), robot).qpos, clip.qpos)
+
+
+def test_wide_steps_to_the_side_are_followed(robot: Robot) -> None:
+    """Soles stand on their edges where ankles roll no further, as in clips."""
+    figures = measure(followed(stepping_aside(1.3), robot), robot)
+    check(figures)
+    assert figures.sole_roll > 0.1
 
 
 def test_what_jumps_is_followed_in_steps(robot: Robot) -> None:
@@ -136,6 +143,30 @@ def test_joint_angles_come_over_the_connection(sessions: Sessions, robot: Robot)
     assert np.abs(angles[:, 2]).max() < 1.0
     asked = np.array([frame["root"] for frame in found])[:, [2, 0]]
     assert np.linalg.norm(angles[:, :2] - asked, axis=1).max() < 0.3
+
+
+def test_steering_is_in_the_robots_metres(sessions: Sessions, robot: Robot) -> None:
+    """A path and a pace are the robot's, and are recorded as they were said; what nobody of that size does is told."""
+    path = {"points": [[0.0, 3.0]], "speed": 0.45}
+    found: list[dict[str, Any]] = []
+    recorded: dict[str, Any] = {}
+
+    async def lead(client: Client) -> None:
+        client.say(type="hello", seed=3, robot="tin")
+        await client.next("welcome")
+        client.say(type="steer", speed=11.5)
+        assert f"{1 / robot.metre:.2f} times as large" in (await client.next("error"))["message"]
+        client.say(type="path", **path)
+        found.extend(await client.frames(150))
+        client.say(type="record")
+        recorded.update(await client.next("recorded"))
+
+    talk(sessions, lead)
+    (command,) = recorded["commands"]
+    assert {name: command[name] for name in path} == path
+    poses = np.array([frame["qpos"] for frame in found])
+    speeds = np.linalg.norm(poses[75:125, :2] - poses[50:100, :2], axis=1) / 0.5
+    assert np.median(speeds) == pytest.approx(0.45, abs=0.05)
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,10 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import read_body
 from motionloom.robots.body import Robot, read_robot, to_motion
 from motionloom.robots.clip import FPS, Clip, put_on_robot
 from motionloom.robots.figures import measure
 from motionloom.robots.files import save_clip
-from motionloom.skeleton import SMPL22
 
 FORMATS = ("npz", "csv", "webdataset")
 """Of the batch's formats those that hold joint angles; the second one holds nothing else."""
@@ -34,7 +32,7 @@ class OnRobot:
     @property
     def metre(self) -> float:
         """Of its own that one of the uniform person's becomes: goals are in the robot's metres."""
-        return read_body(self.robot.skeleton).leg / read_body(SMPL22).leg
+        return self.robot.metre
 
     def put(self, motion: Motion, fps: float | None) -> tuple[Motion, dict[str, Any], Save]:
         """What the robot does, as motion of its skeleton; its figures; and what writes its joint angles.
@@ -45,7 +43,7 @@ class OnRobot:
         clip = put_on_robot(
             motion, self.robot, fps=fps or FPS, max_speed=self.max_speed, avoid_collisions=self.avoid_collisions
         )
-        figures = measure(clip, self.robot)
+        figures = measure(clip, self.robot, max_speed=self.max_speed)
         own = ("frames", "fps", "fastest")  # the record has the first two anyway
         found = {name: value for name, value in figures.as_dict().items() if name not in own}
         return self._moving(clip), {**found, "faults": len(figures.faults())}, self._saving(clip)

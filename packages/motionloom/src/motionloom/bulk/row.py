@@ -261,9 +261,11 @@ class Sources:
     def _ask(self, row: Row) -> Asked:
         timeline = start = target = clip = None
         goal: tuple[Goal | None, str | None] = (None, None)
+        robot = self._robot(row)
+        metre = 1.0 if robot is None else robot.metre
         seed = self.seed if row.seed is None else row.seed
         if row.timeline is not None:
-            timeline = self._read("timeline", row.timeline, read_timeline)
+            timeline = self._read("timeline", row.timeline, lambda path: read_timeline(path, metre), metre)
             start = None if timeline.start is None else self._kept("start", timeline.start, load)
             _check_timeline(row.task, timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
@@ -271,16 +273,13 @@ class Sources:
         elif row.motion is not None:
             frames, clip, digest = 0, Field(row.motion, "motion").file(self.folder), None
         else:
-            timeline, digest = self._worded(row)
+            timeline, digest = self._worded(row, metre)
             length = self.seconds if row.seconds is None else row.seconds
             frames = frames_in(length, self.fps) if timeline is None else timeline.frames
         if row.goal is not None:
-            goal = self._goal(row.goal, frames)
+            goal = self._goal(row.goal, frames, metre)
         if row.skeleton:
             target = self._skeleton(row.skeleton, Field(row.skeleton, "skeleton"))
-        robot = self._robot(row)
-        if robot is not None and goal[0] is not None:
-            goal = (goal[0].scaled(1 / robot.metre), goal[1])
         if robot is None and row.skeleton is None and self.skeleton is not None:
             target = self._skeleton(self.skeleton, None)
         said = {
@@ -308,7 +307,7 @@ class Sources:
             return 1
         return self.best_of if row.best_of is None else row.best_of
 
-    def _worded(self, row: Row) -> tuple[Timeline | None, str | None]:
+    def _worded(self, row: Row, metre: float) -> tuple[Timeline | None, str | None]:
         """The row's prompt as a timeline, where numbers in it are kept, and its hash.
 
         It is as long as the numbers need where no time is said. Many rows have the same words: they are read once.
@@ -317,18 +316,19 @@ class Sources:
             return None, None
         if row.seconds is not None and not SHORTEST <= row.seconds <= LONGEST:
             return None, None
-        return self._written.get((row.prompt, row.seconds), lambda: _timeline_in(row.prompt, row.seconds))
+        words = (row.prompt, row.seconds, metre)
+        return self._written.get(words, lambda: _timeline_in(*words))
 
-    def _goal(self, goal: str | dict[str, Any], frames: int) -> tuple[Goal, str]:
+    def _goal(self, goal: str | dict[str, Any], frames: int, metre: float) -> tuple[Goal, str]:
         """A goal and its hash; rows with the same goal share it."""
 
         def read(source: Any, folder: Path) -> tuple[Goal, str]:
-            found = read_goal(source, frames=frames, folder=folder)
+            found = read_goal(source, frames=frames, folder=folder, metre=metre)
             return found, digest_goal(found)
 
         if isinstance(goal, str):
-            return self._read("goal", goal, lambda path: read(path, path.parent), frames)
-        return self._written.get((json.dumps(goal), frames), lambda: read(goal, self.folder))
+            return self._read("goal", goal, lambda path: read(path, path.parent), frames, metre)
+        return self._written.get((json.dumps(goal), frames, metre), lambda: read(goal, self.folder))
 
     def _robot(self, row: Row) -> OnRobot | None:
         """The robot that the row's motion is put on; what it does not say is as the job says."""
@@ -382,8 +382,8 @@ class _Kept:
         self._values.clear()
 
 
-def _timeline_in(prompt: str, seconds: float | None) -> tuple[Timeline | None, str | None]:
-    found = timeline_of(prompt, seconds, amounts=True)
+def _timeline_in(prompt: str, seconds: float | None, metre: float) -> tuple[Timeline | None, str | None]:
+    found = timeline_of(prompt, seconds, amounts=True, metre=metre)
     return (found, digest_timeline(found, None)) if found.readings else (None, None)
 
 

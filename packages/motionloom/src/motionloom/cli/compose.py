@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.looping import check_loop, looped
 from motionloom.cli.options import add_options
+from motionloom.cli.robots import metres_told
 from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
@@ -55,7 +56,10 @@ def _compose(arguments: argparse.Namespace) -> int:
     from dataclasses import replace
 
     outs, target = ([], None) if arguments.check else check_outs(arguments)
-    timeline = _timeline(arguments)
+    metre = 1.0 if target is None else target.metre
+    timeline = _timeline(arguments, metre)
+    if metre != 1.0 and timeline.asks:
+        print(f"note: {metres_told(metre)}", file=sys.stderr)
     if arguments.check:
         _report(arguments, timeline, seconds=timeline.seconds, streams=[])
         return 0
@@ -76,8 +80,8 @@ def _compose(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _timeline(arguments: argparse.Namespace) -> "Timeline":
-    """What is asked, whether in a file or on the command line."""
+def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
+    """What is asked, whether in a file or on the command line. metre: as of `Target.metre`."""
     from motionloom.goals import timeline
 
     given: list[str] = arguments.segments
@@ -89,7 +93,7 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
         fail(f"give either one timeline file or prompts; got {files[0]} and {len(given) - 1} more")
     if arguments.seconds is not None or arguments.transition is not None:
         fail(f"--seconds and --transition go with prompts; write them into {files[0]}")
-    return timeline.read_timeline(files[0])
+    return timeline.read_timeline(files[0], metre)
 
 
 def _open(
@@ -208,7 +212,8 @@ def _report(
         print(json.dumps(about, indent=1))
         return
     for stream in streams:
-        print(f"wrote {stream.path}: {seconds:.2f} s, {stream.frames} frames")
+        frames = "" if arguments.robot else f", {stream.frames} frames"  # a robot's file has its own rate
+        print(f"wrote {stream.path}: {seconds:.2f} s{frames}")
     if not streams:
         print(f"{len(rows):,} segments, {seconds:.2f} s in all; nothing was made")
     for row in rows[:SHOWN]:

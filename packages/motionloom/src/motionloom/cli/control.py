@@ -120,20 +120,21 @@ def _told(goal: "Goal", metre: float) -> str:
     """How a path in a robot's metres is walked by the person that is drawn."""
     import numpy as np
 
+    from motionloom.cli.robots import metres_told
     from motionloom.goals.goal import FPS
 
-    said = "goals are in the robot's metres"
     asked = np.flatnonzero(goal.asked[:, 0, [0, 2]].all(axis=1))
     if len(asked) < 2:
-        return f"{said}; the person that is drawn has them {1 / metre:.2f} times as far away"
+        return metres_told(metre)
     way = float(np.linalg.norm(np.diff(goal.positions[asked, 0][:, [0, 2]], axis=0), axis=1).sum())
     pace = way * FPS / (asked[-1] - asked[0])
-    return f"{said}: it goes {metre * way:.2f} m at {metre * pace:.2f} m/s, as a person would at {pace:.2f} m/s"
+    gone = f"it goes {metre * way:.2f} m at {metre * pace:.2f} m/s, as a person would at {pace:.2f} m/s"
+    return f"goals are in the robot's metres: {gone}"
 
 
 def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
-    """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a drawing
-    that is as large as is walked in the time and a clip that is followed are the person's anyway."""
+    """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a clip that
+    is followed is the person's anyway."""
     from dataclasses import replace
 
     from motionloom.cli.reading import load_motion
@@ -151,10 +152,9 @@ def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
     clip = None if arguments.clip is None else load_motion(arguments, arguments.clip)
     usual = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
     frames = frames_in(usual if arguments.seconds is None else arguments.seconds, FPS)
-    goals = [read_goal(file, frames=frames, folder=file.parent).scaled(1 / metre) for file in arguments.goal]
+    goals = [read_goal(file, frames=frames, folder=file.parent, metre=metre) for file in arguments.goal]
     if arguments.path is not None:
-        drawn = _drawn(arguments.path, arguments.width, frames)
-        goals.append(drawn if arguments.width is None else drawn.scaled(1 / metre))
+        goals.append(_drawn(arguments.path, arguments.width, frames, metre))
     if clip is not None:
         goals.append(follow(clip, arguments.follow, frames=frames))
     whole = goals[0]
@@ -169,13 +169,13 @@ def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
     return whole
 
 
-def _drawn(path: Path, width: float | None, frames: int) -> "Goal":
+def _drawn(path: Path, width: float | None, frames: int, metre: float) -> "Goal":
     """The line of an SVG file."""
     from motionloom.goals.goal_file import read_goal
 
     size = {} if width is None else {"width": width}
     drawing = path.resolve() if path.exists() else path  # a link may lead anywhere
-    return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent)
+    return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent, metre=metre)
 
 
 def _made(

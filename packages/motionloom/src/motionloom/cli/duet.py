@@ -9,6 +9,7 @@ from motionloom.cli.finished import Finished, groups
 from motionloom.cli.looping import looped
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
+from motionloom.cli.robots import metres_told
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -97,8 +98,11 @@ def run_duet(arguments: argparse.Namespace) -> int:
     outs, skin = check_pair_outs(arguments)
     files = places(outs, arguments.count, sheets=False, target=skin)
     check_overwriting(arguments, [file for several in files for file in several])
-    timeline = _timeline(arguments) if arguments.timeline else None
-    goals = _goals(arguments)
+    metre = 1.0 if skin is None else skin.metre
+    timeline = _timeline(arguments, metre) if arguments.timeline else None
+    goals = _goals(arguments, metre)
+    if metre != 1.0 and (any(goals) or (timeline is not None and timeline.asks)):
+        print(f"note: {metres_told(metre)}", file=sys.stderr)
     given, manners = _read(arguments)
     _check_sizes(arguments, files, given, timeline)
     prior, block = _load(arguments)
@@ -233,7 +237,7 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
     return motions, manners
 
 
-def _timeline(arguments: argparse.Namespace) -> "Timeline":
+def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
     from motionloom.errors import MotionloomError
     from motionloom.goals.roles import prompts_of
     from motionloom.goals.timeline import read_timeline
@@ -241,7 +245,7 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
     from motionloom.io.lined_yaml import read_lined
 
     path = arguments.timeline
-    timeline = read_timeline(path)
+    timeline = read_timeline(path, metre)
 
     def wrong(key: str, message: str, number: int | None = None) -> NoReturn:
         top: Any = read_lined(path).value
@@ -259,16 +263,16 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
     return timeline
 
 
-def _goals(arguments: argparse.Namespace) -> "tuple[Goal | None, Goal | None]":
+def _goals(arguments: argparse.Namespace, metre: float) -> "tuple[Goal | None, Goal | None]":
     """What the first and what the second is asked."""
-    asked = [_goal(arguments, path) for path in arguments.path or ()]
+    asked = [_goal(arguments, path, metre) for path in arguments.path or ()]
     if len(asked) == 2:
         return asked[0], asked[1]
     goal = asked[0] if asked else None
     return (goal, None) if arguments.person == 1 else (None, goal)
 
 
-def _goal(arguments: argparse.Namespace, path: Path) -> "Goal":
+def _goal(arguments: argparse.Namespace, path: Path, metre: float) -> "Goal":
     """What somebody is asked: a goal file, such a mapping in YAML, or a drawn line."""
     from motionloom.errors import MotionloomError
     from motionloom.goals.goal import FPS
@@ -284,13 +288,14 @@ def _goal(arguments: argparse.Namespace, path: Path) -> "Goal":
         if {"points", "svg", "curve"} & set(what):
             what = {"path": what}
         try:
-            return read_goal(what, frames=frames, folder=path.parent)
+            return read_goal(what, frames=frames, folder=path.parent, metre=metre)
         except MotionloomError as error:
             fail(f"{path}: {error}")
     if path.suffix.lower() == ".svg":
         drawing = path.resolve() if path.exists() else path  # a link may lead anywhere
-        return read_goal({"path": {"svg": drawing.name}}, frames=frames, folder=drawing.parent)
-    return read_goal(path, frames=frames, folder=path.parent)
+        what = {"path": {"svg": drawing.name}}
+        return read_goal(what, frames=frames, folder=drawing.parent, metre=metre)
+    return read_goal(path, frames=frames, folder=path.parent, metre=metre)
 
 
 # What cannot be asked

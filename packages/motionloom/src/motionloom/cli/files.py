@@ -45,6 +45,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     add_skeleton(export, own="IN's")
     export.add_argument("--source-map", "--joint-map", type=Path, metavar="JSON", help="which joints are which, of IN")
     export.add_argument("--mirror", action="store_true", help="exchange left and right")
+    export.add_argument(
+        "--check", action="store_true", help="only print how good the clip of a --robot is, as JSON (robot-check)"
+    )
     add_writing(export, unit="as read, else m")
     export.add_argument("--order", metavar="XYZ", help="order of rotations of a BVH written (as read, else ZXY)")
     export.set_defaults(run=run_export)
@@ -76,11 +79,14 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     info.set_defaults(run=run_info)
 
 
-def run_export(arguments: argparse.Namespace) -> None:
+def run_export(arguments: argparse.Namespace) -> int:
     """``motionloom export IN OUT``."""
     from motionloom import io
+    from motionloom.cli.robots import check_inputs
     from motionloom.errors import MotionloomError
 
+    if arguments.check:
+        return check_inputs(arguments)
     arguments.inputs, target = _files(arguments)
     skin = read_target(arguments, [target])
     io.check_output(target, own=skin and skin.suffix)
@@ -102,6 +108,7 @@ def run_export(arguments: argparse.Namespace) -> None:
     elif target.suffix.lower() == ".bvh":
         from motionloom.io.bvh import save_bvh, unit_that_reads_back
 
+        motion = motion if skin is None else skin.shown(motion, target)
         chosen = arguments.out_unit or unit_that_reads_back(motion, unit or 1.0)
         if unit_that_reads_back(motion, chosen) != chosen:
             print(f"note: give --unit {chosen:g} to read {target} at this size: bones do not show it", file=sys.stderr)
@@ -109,8 +116,10 @@ def run_export(arguments: argparse.Namespace) -> None:
     else:
         _only_bvh(arguments, target)
         (io.save if skin is None else skin.save)(motion, target)
-    print(f"wrote {target}: {'; '.join(_summary(motion) for motion in motions)}")
+    held = (skin and skin.told()) or "; ".join(_summary(motion) for motion in motions)
+    print(f"wrote {target}: {held}")
     note_rate(arguments, arguments.inputs)
+    return 0
 
 
 def _exported(

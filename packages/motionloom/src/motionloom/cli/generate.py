@@ -64,7 +64,8 @@ def _generate(arguments: argparse.Namespace) -> int:
     files = places(outs, len(captions), target=target)
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
-    timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
+    metre = 1.0 if target is None else target.metre
+    timelines = {prompt: _timeline(arguments, prior, prompt, metre) for prompt in prompts}
     for found in timelines.values():
         check_loop(arguments, found.seconds)
     remarks = unknown_words(prior, [segment.text for found in timelines.values() for segment in found.segments])
@@ -157,8 +158,8 @@ def _remark_seats(seated: "list[list[Seat]]") -> None:
             )
 
 
-def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":
-    """What a prompt asks, one segment or several; says so where there are several."""
+def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str, metre: float) -> "Timeline":
+    """What a prompt asks, one segment or several; says so where there are several. metre: as of `Target.metre`."""
     from motionloom.goals.remarks import numbers_read, parts_read
     from motionloom.tasks.worded import read
 
@@ -168,6 +169,7 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Ti
         arguments.seconds,
         parted=not arguments.as_one,
         amounts=not (arguments.literal or arguments.as_one),
+        metre=metre,
     )
     if said := numbers_read(found):
         if arguments.best_of > 1 and len(found.segments) == 1:

@@ -1,6 +1,7 @@
 """`motionloom live`: a scripted session with one or two people who are steered, to files or against the clock."""
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.duet import check_pair_outs, write_pairs
 from motionloom.cli.looping import check_loop, looped
 from motionloom.cli.options import add_options
+from motionloom.cli.robots import metres_told
 from motionloom.cli.sampling import add_adapters, check_outs, fail, load_prior
 from motionloom.cli.sampling import write as write_files
 from motionloom.cli.skeletons import Target, add_skeleton
@@ -63,6 +65,7 @@ def add(subparsers) -> None:
 
 
 def _live(arguments: argparse.Namespace) -> int:
+    from motionloom.live.commands import scaled
     from motionloom.live.live import motion_of
     from motionloom.live.script import read_script
     from motionloom.runtime import set_threads
@@ -82,7 +85,10 @@ def _live(arguments: argparse.Namespace) -> int:
     set_threads(1)  # a window's matrices are small: two threads would wait for each other at every layer
     prior = load_prior(arguments)
     seed = script.seed if arguments.seed is None else arguments.seed
-    live = _made(arguments, script, prior, seed)
+    metre = 1.0 if target is None else target.metre
+    if metre != 1.0 and any(scaled(one.command, 1 / metre) != one.command for one in script.commands):
+        print(f"note: {metres_told(metre)}", file=sys.stderr)
+    live = _made(arguments, script, prior, seed, metre=metre)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
     words = [[one.words for one in shown] for shown in frames]
     motions = [motion_of([shown[i] for shown in frames], live.fps) for i in range(script.people)]
@@ -93,7 +99,7 @@ def _live(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed: int) -> "Stage":
+def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed: int, *, metre: float) -> "Stage":
     from motionloom.cli.reading import load_motion
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
@@ -102,7 +108,7 @@ def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed:
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
     starts = [load_motion(arguments, path) for path in arguments.start or ()]
-    shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings}
+    shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings, "metre": metre}
     if script.people == 1:
         return Live(prior, start=starts[0] if starts else None, **shared)
     block = PairBlock.load(arguments.pair_weights, prior)
@@ -181,7 +187,8 @@ def _report(
         print(json.dumps({**about, **made, **({"clock": asdict(health)} if health else {})}, indent=1))
         return
     for path in written:
-        print(f"wrote {path}: {script.seconds:.2f} s, {made['frames']} frames, {made['calls']} network calls")
+        frames = "" if arguments.robot else f", {made['frames']} frames"  # a robot's file has its own rate
+        print(f"wrote {path}: {script.seconds:.2f} s{frames}, {made['calls']} network calls")
     if not written:
         print(f"{len(script.commands)} commands in {script.seconds:.2f} s; nothing was made")
     if health:

@@ -47,7 +47,7 @@ class RobotTarget(Target):
     @property
     def metre(self) -> float:
         """Goals are in the robot's metres."""
-        return self.size
+        return self.robot.metre
 
     def writes(self, path: Path) -> bool:
         """No file of a robot is a character's with one more animation."""
@@ -65,19 +65,37 @@ class RobotTarget(Target):
 
     def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
         """Write the robot's clip, or a picture or a film of it; any other format gets the motion of its skeleton."""
-        from motionloom import io
-        from motionloom.robots.body import to_motion
         from motionloom.robots.files import save_clip
         from motionloom.robots.film import draw
 
-        if not self.last or self.last[0][0] is not motion:
-            self.last[:] = [(motion, self.clip(motion, path))]
-        clip = self.last[0][1]
+        if path.suffix.lower() not in (*OUTS, *PICTURES):
+            return super().save(self.shown(motion, path), path, caption=caption)
+        clip = self._made(motion, path)
         if path.suffix.lower() in OUTS:
             return save_clip(clip, self.robot, path, header=self.header)
-        if path.suffix.lower() in PICTURES:
-            return draw(self.robot, clip.qpos, clip.fps, path, caption=caption or "")
-        return io.save(to_motion(self.robot, clip.qpos, clip.fps), path)
+        return draw(self.robot, clip.qpos, clip.fps, path, caption=caption or "")
+
+    def shown(self, motion: "Motion", path: Path) -> "Motion":
+        """The robot's clip as motion of its skeleton; one that was read keeps its rate."""
+        from motionloom.robots.body import to_motion
+
+        known = _READ.get(motion)
+        if known is not None and self.max_speed is None and not self.avoid:
+            self.last[:] = [(motion, known)]
+            return motion
+        clip = self._made(motion, path)
+        return to_motion(self.robot, clip.qpos, clip.fps)
+
+    def _made(self, motion: "Motion", path: Path) -> "Clip":
+        if not self.last or self.last[0][0] is not motion:
+            self.last[:] = [(motion, self.clip(motion, path))]
+        return self.last[0][1]
+
+    def told(self) -> str:
+        """How long the robot's clip is, at its own rate."""
+        clip = self.last[0][1]
+        length, hinges = len(clip) / clip.fps, len(self.robot.file.hinges)
+        return f"{len(clip)} frames, {length:.2f} s at {clip.fps:g} frames per second, {hinges} joints of a robot"
 
     def takes(self, clip: "Clip") -> bool:
         """Whether a clip that was read is written as it is."""
@@ -100,7 +118,7 @@ class RobotTarget(Target):
             )
         except MotionloomError as error:
             raise MotionloomError(f"{path} for {self.robot.name}: {error}") from None
-        figures = measure(clip, self.robot)
+        figures = measure(clip, self.robot, max_speed=self.max_speed)
         if clip.slowed:
             print(
                 f"note: {path} is {clip.slowed:.2f} s longer than the motion, so that no joint is too fast",
@@ -113,6 +131,12 @@ class RobotTarget(Target):
 
             print(json.dumps({"file": str(path), **figures.as_dict()}))
         return clip
+
+
+def metres_told(metre: float) -> str:
+    """What goals on a robot are, of which ``metre`` is one of the person's that is drawn, for stderr."""
+    said = "goals are in the robot's metres"
+    return f"{said}; the person that is drawn has them {1 / metre:.2f} times as far away and as fast"
 
 
 def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
@@ -131,6 +155,7 @@ def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
         name=str(arguments.robot),
         skeleton=robot.skeleton,
         robot=robot,
+        unit=getattr(arguments, "out_unit", None) or 1.0,
         fps=fps,
         max_speed=arguments.max_speed,
         avoid=arguments.avoid_collisions,
@@ -164,12 +189,12 @@ def reads_as_clip(arguments: argparse.Namespace, path: Path) -> bool:
     return True
 
 
-def read_motion(arguments: argparse.Namespace, path: Path) -> "Motion":
-    """A robot's file as motion of its skeleton."""
+def read_motion(arguments: argparse.Namespace, path: Path, robot: "Robot | None" = None) -> "Motion":
+    """A robot's file as motion of its skeleton; robot: that of the line, where it was read."""
     from motionloom.robots.body import to_motion
     from motionloom.robots.files import load_clip
 
-    robot = opened(arguments)
+    robot = robot or opened(arguments)
     rate = getattr(arguments, "source_fps", None)
     clip = load_clip(path, robot, fps=rate)
     if path.suffix.lower() == ".csv" and rate is None:
@@ -208,27 +233,30 @@ def run_check(arguments: argparse.Namespace) -> int:
 
     from motionloom.cli.reading import crop, read_clip
     from motionloom.errors import MotionloomError
-    from motionloom.robots.clip import FPS, put_on_robot
+    from motionloom.robots.clip import FPS, check_settings, put_on_robot
     from motionloom.robots.figures import measure
-    from motionloom.robots.files import load_clip
     from motionloom.robots.physics import track
 
     if arguments.robot is None:
         raise MotionloomError("robot-check needs the robot's model; name it with --robot")
     robot = opened(arguments)
+    fps = arguments.fps or FPS
+    check_settings(fps, arguments.max_speed)
     if reads_as_clip(arguments, arguments.input):
-        clip = load_clip(arguments.input, robot, fps=arguments.source_fps)
+        whole = read_motion(arguments, arguments.input, robot)
+        first = round((arguments.start or 0.0) * whole.fps)
+        clip = _READ[whole].frames(first, first + len(crop(whole, arguments)))
     else:
         motion = crop(read_clip(arguments, arguments.input)[0], arguments)
         clip = put_on_robot(
             motion,
             robot,
-            fps=FPS,
+            fps=fps,
             max_speed=arguments.max_speed,
             avoid_collisions=arguments.avoid_collisions,
             source_map=arguments.source_map,
         )
-    figures = measure(clip, robot)
+    figures = measure(clip, robot, max_speed=arguments.max_speed)
     found = figures.as_dict() | {"faults": figures.faults()}
     if arguments.physics:
         if len(clip) < 2:
@@ -239,6 +267,16 @@ def run_check(arguments: argparse.Namespace) -> int:
     else:
         _print(found)
     return 1 if found["faults"] else 0
+
+
+def check_inputs(arguments: argparse.Namespace) -> int:
+    """``motionloom export FILE --robot MODEL --check``: as `run_check`, in JSON; nothing is written."""
+    from motionloom.errors import MotionloomError
+
+    if arguments.robot is None or len(arguments.inputs) != 1 or arguments.out is not None or arguments.mirror:
+        raise MotionloomError("--check says how good a robot's clip is; give one file, its --robot, and no OUT")
+    arguments.input, arguments.json, arguments.physics = arguments.inputs[0], True, False
+    return run_check(arguments)
 
 
 def _print(found: dict) -> None:

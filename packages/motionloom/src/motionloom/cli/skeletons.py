@@ -208,6 +208,14 @@ class Target:
             return save_bvh(motion, path, order=self.orders, unit=self.unit)
         return io.save(motion, path, captions=None if caption is None else [caption])
 
+    def shown(self, motion: "Motion", path: Path) -> "Motion":
+        """A motion that is `put` on the skeleton, as a file that holds poses gets it."""
+        return motion
+
+    def told(self) -> str:
+        """What the file that was written last holds, where that is not the motion as it was put; else empty."""
+        return ""
+
     def plays_in(self, path: Path) -> bool:
         """Whether a file of this name is a page in which the character plays."""
         return self.character is not None and path.suffix.lower() == ".html"

@@ -106,7 +106,7 @@ def measured(amount: Amount, positions: np.ndarray, fps: float = FPS) -> float:
         side = 1.0 if (amount.direction == "left") != against else -1.0
         return float(side * np.degrees(facing[-1] - facing[0]))
     moved = positions[-1, 0] - positions[0, 0]
-    return float(np.hypot(moved[0], moved[2]))
+    return amount.metre * float(np.hypot(moved[0], moved[2]))
 
 
 def kept(amount: Amount, size: float) -> bool:

@@ -40,6 +40,8 @@ class Amount:
     """Whether an arc is walked backwards."""
     of: Counted | None = None
     """What is repeated."""
+    metre: float = 1.0
+    """Metres of ``size`` that one of the 22-joint person's becomes."""
 
     @property
     def unit(self) -> str:
@@ -68,12 +70,12 @@ class Amount:
 
     @property
     def metres(self) -> float:
-        """The length of the way; 0 for a turn."""
+        """The length of the way of the 22-joint person; 0 for a turn."""
         if self.kind == "steps":
             return self.size * self.stride
         if self.kind == "arc":
             return RADIUS * math.radians(self.size)
-        return self.size if self.kind == "way" else 0.0
+        return self.size / self.metre if self.kind == "way" else 0.0
 
 
 RADIUS = 1.0

@@ -53,19 +53,23 @@ _TIE = 0.05
 """Metres that a path may begin beside the place where the person starts."""
 
 
-def read_goal(source: Path | str | Mapping[str, Any], *, frames: int, fps: float = FPS, folder: Path) -> Goal:
+def read_goal(
+    source: Path | str | Mapping[str, Any], *, frames: int, fps: float = FPS, folder: Path, metre: float = 1.0
+) -> Goal:
     """Read a goal file, or a mapping of the same keys, as the targets of a motion of so many frames.
 
     The motion takes ``frames / fps`` seconds. Files that a goal file names lie in its own folder or below; those of a
-    mapping in ``folder``. The goal's world is metres, +Y up; facing 0 is +Z, positive towards +X. Raises
-    `MotionloomError`, naming the key, for what cannot be read, contradicts itself or is out of anybody's reach.
+    mapping in ``folder``. The goal's world is metres, +Y up; facing 0 is +Z, positive towards +X. metre: what one metre
+    of the 22-joint person, whose goal this becomes, is in the file, such as a robot's `metre`; motions that the file
+    names are a person's. Raises `MotionloomError`, naming the key, for what cannot be read, contradicts itself or is
+    out of anybody's reach.
     """
     if not 1 <= frames <= MAX_FRAMES:
         raise MotionloomError(f"a goal is read for 1 to {MAX_FRAMES:,} frames; got {frames}")
     if isinstance(source, Mapping):
-        return _Reader(frames, fps, folder).goal(Field(source))
+        return _Reader(frames, fps, folder, metre).goal(Field(source))
     path = Path(source)
-    return _Reader(frames, fps, path.parent).goal(Field(_parsed(path), source=str(path)))
+    return _Reader(frames, fps, path.parent, metre).goal(Field(_parsed(path), source=str(path)))
 
 
 def _parsed(path: Path) -> Any:
@@ -109,6 +113,7 @@ class _Reader:
     frames: int
     fps: float
     folder: Path
+    metre: float
     people: dict[Path, tuple[np.ndarray, float]] = field(default_factory=dict)
     """Places (frames, 22, 3) and rate of motion files that were read already."""
 
@@ -133,6 +138,7 @@ class _Reader:
         for item in _one_or_many(given.get("follow")):
             found = self.follow(item)
             goal = self.joined(goal, found if goal.start is None else replace(found, start=None), item)
+        goal = goal.scaled(1 / self.metre)
         try:
             check_reach(goal)
         except MotionloomError as error:
@@ -236,7 +242,7 @@ class _Reader:
             return given["scale"].number(1e-6, 1e6)
         if "width" not in given:
             begin, end = self.times(given.get("times"), 2) or (0.0, self.seconds)
-            return WALKING * (end - begin) / float(lengths_along(points)[-1])
+            return self.metre * WALKING * (end - begin) / float(lengths_along(points)[-1])
         across = float(np.ptp(points[:, 0]))
         if across < 1e-6 * np.ptp(points[:, 1]):
             given["width"].fail("cannot be that of a drawing that goes straight up or down; give 'scale' instead")
@@ -357,7 +363,7 @@ class _Reader:
         if path not in self.people:
             try:
                 motion = load(path)
-                self.people[path] = to_smpl22(motion).positions(), motion.fps
+                self.people[path] = self.metre * to_smpl22(motion).positions(), motion.fps
             except MotionloomError as error:
                 found.fail(f"cannot be used: {error}")
         return self.people[path]

@@ -76,19 +76,25 @@ class Timeline:
         return sum(_frames(segment.seconds) for segment in self.segments)
 
     @property
+    def asks(self) -> bool:
+        """Whether there are places to keep to."""
+        return self.path is not None or any(one.goal is not None for one in self.segments)
+
+    @property
     def seconds(self) -> float:
         """Length of the whole: the sum of the segments', each a whole number of frames."""
         return self.frames / FPS
 
 
-def read_timeline(path: Path | str) -> Timeline:
+def read_timeline(path: Path | str, metre: float = 1.0) -> Timeline:
     """Read a timeline file.
 
-    Seconds; goals in metres as `motionloom.goals.goal` defines them. Files that the timeline names lie in its own
-    folder or below. Raises `MotionloomError` with file and line for whatever is wrong.
+    Seconds; goals in metres as `motionloom.goals.goal` defines them; metre: as of `goal_file.read_goal`. Files that
+    the timeline names lie in its own folder or below. Raises `MotionloomError` with file and line for whatever is
+    wrong.
     """
     path = Path(path)
-    return _Reader(path).timeline(read_lined(path))
+    return _Reader(path, metre).timeline(read_lined(path))
 
 
 def timeline_of_yaml(text: str, *, folder: Path) -> tuple[Timeline, Any]:
@@ -140,12 +146,13 @@ def whole(text: str, seconds: float) -> Timeline:
     return Timeline((Segment(text, seconds),))
 
 
-def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = False) -> Timeline:
+def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = False, metre: float = 1.0) -> Timeline:
     """One sentence as segments, one for each action that follows another (`motionloom.goals.sequence`).
 
     seconds: of the whole, shared out as the actions' own lengths are; None: those lengths. A sentence that says one
     thing, or several at once, is one segment of 5 s. amounts: numbers with units in the words become lengths and goals
-    of their segments (`motionloom.goals.amounts`). Raises `MotionloomError` for what cannot be asked.
+    of their segments (`motionloom.goals.amounts`). metre: as of `goal_file.read_goal`, of metres in the words. Raises
+    `MotionloomError` for what cannot be asked.
     """
     from motionloom.goals.sequence import split_actions
 
@@ -153,16 +160,16 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
         raise MotionloomError(problem)
     parts = split_actions(text)
     if amounts:
-        return _with_amounts(text, parts, seconds)
+        return _with_amounts(text, parts, seconds, metre)
     return _of_parts(text, parts, seconds)
 
 
-def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
+def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre: float) -> Timeline:
     """As long as the numbers in the words need, with their goals; without one as `_of_parts`."""
     from motionloom.goals.amount_goal import seconds_for
     from motionloom.goals.amounts import read_amount, read_seconds
 
-    read = [read_amount(part.text) for part in parts]
+    read = [amount and replace(amount, metre=metre) for amount in (read_amount(part.text) for part in parts)]
     found = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
     own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, found, strict=True)]
     if not any(own):
@@ -252,7 +259,10 @@ class _Row:
     adapters: tuple[tuple[Path, float], ...] = ()
 
 
+@dataclass(frozen=True)
 class _Reader(LinedFile):
+    metre: float = 1.0
+
     def timeline(self, document: Lined) -> Timeline:
         top = self.mapping(document, tuple(specs(TimelineKeys)), "a timeline")
         if "segments" not in top:
@@ -375,7 +385,7 @@ class _Reader(LinedFile):
         else:
             self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {self.got(found)}")
         try:
-            return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent)
+            return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent, metre=self.metre)
         except MotionloomError as error:
             self.fail(_line(found, str(error)), f"{name}: {error}")
 

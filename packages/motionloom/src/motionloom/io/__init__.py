@@ -15,7 +15,7 @@ from motionloom.motion import Motion
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
 _BLENDER = "Blender turns it into a .glb (docs/blender.md)"
-_ROBOT = "joint angles of a robot go with its model: --robot (docs/robots.md)"
+_ROBOT = "joint angles of a robot go with its model: --robot, in Python robots.files.load_motion (docs/robots.md)"
 _WAYS_OUT = {
     ".gltf": _OWN.format(".gltf"),
     ".vrm": _OWN.format(".vrm"),

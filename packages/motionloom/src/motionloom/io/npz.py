@@ -267,7 +267,9 @@ def _motion(arrays: dict[str, np.ndarray], fps: float, path: Path | str) -> Moti
 def _from_positions(arrays: dict[str, np.ndarray], fps: float | None, path: Path | str) -> Motion:
     name = next((n for n in _POSITIONS if n in arrays), None)
     if name is None:
-        raise MotionloomError(f"{path} has neither 'rotations' nor 'positions'; it has {_listed(arrays)}")
+        robot = "joint angles of a robot, which go with its model (docs/robots.md)"
+        held = robot if "qpos" in arrays else _listed(arrays)
+        raise MotionloomError(f"{path} has neither 'rotations' nor 'positions'; it has {held}")
     places = _array(arrays, name, (None, len(SMPL22), 3), path=path).astype(np.float64)
     if fps is None or not len(places):
         raise MotionloomError(f"{path} has positions but no 'fps' or no frames; give the frame rate")

@@ -6,7 +6,7 @@ goal files. Everything is checked here, so that nothing that comes from outside 
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -130,6 +130,26 @@ class Pose:
 
 
 Command: TypeAlias = Say | Steer | Path | Reach | Pose
+
+
+def scaled(command: Command, size: float) -> Command:
+    """The same with places and speeds ``size`` times as large, for somebody whose legs are: words, directions, times
+    and poses stay.
+
+    Raises `MotionloomError` where nobody does that.
+    """
+    if size == 1.0 or isinstance(command, Say | Pose):
+        return command
+    try:
+        if isinstance(command, Reach):
+            x, y, z = command.position
+            return replace(command, position=(size * x, size * y, size * z))
+        speed = None if command.speed is None else size * command.speed
+        if isinstance(command, Steer):
+            return replace(command, speed=speed)
+        return replace(command, points=tuple((size * x, size * z) for x, z in command.points), speed=speed)
+    except MotionloomError as error:
+        raise MotionloomError(f"{error}; that is of the person, {size:.2f} times as large as the robot") from None
 
 
 class Taken(NamedTuple):

@@ -140,12 +140,15 @@ class Stage(ABC, Generic[Shown]):
     def addressed(self, command: Command, person: int | None = None) -> list[tuple[Command, int]]:
         """What each person is asked by a command that is for one of them or for everybody; changes nothing.
 
-        Raises `MotionloomError` where there is no such person.
+        Raises `MotionloomError` where there is no such person, or nobody of that size does it.
         """
         if person is not None and not 0 <= person < len(self.people):
             count = "one person" if len(self.people) == 1 else f"{len(self.people)} people"
             raise MotionloomError(f"there is no person {person + 1} in this session; it has {count}")
-        return [(command, whom) for whom in range(len(self.people)) if person in (None, whom)]
+        asked = [(command, whom) for whom in range(len(self.people)) if person in (None, whom)]
+        for part, whom in asked:
+            self.people[whom].own(part)
+        return asked
 
     @property
     def taken(self) -> list[Taken]:
@@ -271,16 +274,18 @@ class Live(Stage[Frame], Asked):
         fps: float = FPS,
         start: Motion | None = None,
         skeleton: Skeleton | None = None,
+        metre: float = 1.0,
         settings: Settings | None = None,
     ) -> None:
         """prior: weights that make HumanML3D's 263 numbers. fps: rate of the frames that are shown, 1 to 240; motion is
         sampled at 20 per second and interpolated. start: a motion of anybody that this goes on from, in its place;
         without one the person begins at the origin facing +Z. skeleton: a humanoid that frames are shown on (None: the
-        22-joint person). Raises `MotionloomError` for what cannot be.
+        22-joint person). metre: metres of what is asked (places, speeds) that one of the 22-joint person's becomes,
+        such as a robot's `metre`. Raises `MotionloomError` for what cannot be.
         """
         check(prior, seed)
         chosen = settings or Settings()
-        super().__init__([Person(prior, chosen, start=start, skeleton=skeleton)], chosen, fps)
+        super().__init__([Person(prior, chosen, start=start, skeleton=skeleton, metre=metre)], chosen, fps)
         self._sampler = Sampler(prior, chosen)
         self._noise = Noise(seed, chosen.steps, len(prior.mean))
 

@@ -46,6 +46,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         fps: float = FPS,
         start: Duet | None = None,
         skeleton: Skeleton | None = None,
+        metre: float = 1.0,
         settings: Settings | None = None,
     ) -> None:
         """block: weights that make two people of this prior. start: what both did before, in one world; without it
@@ -56,7 +57,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         check(prior, seed)
         chosen = settings or Settings()
         pasts: tuple[Motion | None, Motion | None] = start or (None, None)
-        people = [Person(prior, chosen, start=past, skeleton=skeleton) for past in pasts]
+        people = [Person(prior, chosen, start=past, skeleton=skeleton, metre=metre) for past in pasts]
         super().__init__(people, chosen, fps)
         self._prior, self._net, self._seed, self._calls = prior, block.net(prior), seed, 0
 

@@ -18,7 +18,7 @@ from motionloom.goals.goal import Goal, overlaid
 from motionloom.goals.paths import WALKING
 from motionloom.ground import GroundPose
 from motionloom.live.body import body, put
-from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
+from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, scaled
 from motionloom.live.course import ARRIVED, Course, Trail, braking, steered
 from motionloom.live.settings import Settings
 from motionloom.live.targets import SOON, Target, must_go, same_place, way_to, within_reach
@@ -137,7 +137,17 @@ class State:
 class Person(Asked):
     """One of those who move. Frames are counted at 20 per second."""
 
-    def __init__(self, prior: Prior, settings: Settings, *, start: Motion | None, skeleton: Skeleton | None) -> None:
+    def __init__(
+        self,
+        prior: Prior,
+        settings: Settings,
+        *,
+        start: Motion | None,
+        skeleton: Skeleton | None,
+        metre: float = 1.0,
+    ) -> None:
+        """metre: of what is asked that one of the person's becomes; otherwise as `live.Live`."""
+        self._metre = metre
         self._prior, self._settings, self.skeleton = prior, settings, skeleton or SMPL22
         self._words, self._steer = "", Steer()
         self._trail: Trail | None = None
@@ -150,6 +160,7 @@ class Person(Asked):
 
     def ask(self, command: Command) -> None:
         """Ask for something from the next frame on; of several steerings or sentences for one frame the last counts."""
+        self.own(command)
         last = self._asked[-1] if self._asked else None
         if isinstance(command, Reach | Pose) or type(last) is not type(command):
             self._asked.append(command)
@@ -157,6 +168,10 @@ class Person(Asked):
             self._asked[-1] = command
         while len(self._asked) > MOST_ASKED:
             self._asked.popleft()
+
+    def own(self, command: Command) -> Command:
+        """A command in the metres of the 22-joint person; `MotionloomError` where that is out of anybody's reach."""
+        return scaled(command, 1 / self._metre)
 
     @property
     def waiting(self) -> bool:
@@ -212,7 +227,7 @@ class Person(Asked):
         taken: list[Command] = []
         while take and self._asked:
             taken.append(self._asked.popleft())
-            self._take_up(taken[-1], frame, course)
+            self._take_up(self.own(taken[-1]), frame, course)
         goal, words, again = self._wanted(frame, course)
         edits: list[Correction] = []
         turns: list[Correction] = []

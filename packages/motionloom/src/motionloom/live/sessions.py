@@ -90,7 +90,8 @@ class Sessions:
             if len(self._open) >= self._most and not self._make_room():
                 raise MotionloomError(f"this server plays {self._most} live sessions and no more; come back later")
             asked = replace(asked, skeleton=robots[0].robot.skeleton) if robots else asked
-            session = Session(secrets.token_urlsafe(16), asked, self._player(asked).start(), robots)
+            metre = robots[0].robot.metre if robots else 1.0
+            session = Session(secrets.token_urlsafe(16), asked, self._player(asked, metre).start(), robots)
             self._open[session.key] = session
             return session
 
@@ -123,13 +124,12 @@ class Sessions:
         how = {"max_speed": asked.max_speed, "avoid_collisions": bool(asked.avoid_collisions)}
         return tuple(Follower(self._robots[asked.robot], asked.fps, **how) for _ in range(asked.people))
 
-    def _player(self, asked: Hello) -> Player[Any]:
+    def _player(self, asked: Hello, metre: float) -> Player[Any]:
         prior = self._prior()
+        shown = {"fps": asked.fps, "skeleton": asked.skeleton, "metre": metre, "settings": self._settings}
         if asked.people == 1:
-            return Player(Live(prior, seed=asked.seed, fps=asked.fps, skeleton=asked.skeleton, settings=self._settings))
-        block = self._block(prior)
-        pair = LivePair(prior, block, seed=asked.seed, fps=asked.fps, skeleton=asked.skeleton, settings=self._settings)
-        return Player(pair)
+            return Player(Live(prior, seed=asked.seed, **shown))
+        return Player(LivePair(prior, self._block(prior), seed=asked.seed, **shown))
 
     def _again(self, key: str) -> Session:
         session = self._open.get(key)

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
+from motionloom.retarget.anatomy import read_body
 from motionloom.robots.engine import load_mujoco
 from motionloom.robots.joints import LEG, SIDES, Parts, find_parts, limb_points
 from motionloom.robots.model import Hinge, Model, check_limits, read_model
-from motionloom.skeleton import Skeleton
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 LEGS_M = (0.08, 1.6)
@@ -43,6 +44,9 @@ class Robot:
     soles: dict[str, Array]
     """Side to (corners, 3) metres in the frame of the ankle's site, +Z up: heels first, then toes, at rest on one
     plane."""
+    rolls: dict[str, tuple[float, float]]
+    """Side to the radians, left side up, that a foot rolls from where it is level at rest; infinite without such a
+    hinge."""
     notes: tuple[str, ...]
     map: Path | None = None
     """Which joint is which, as a user said."""
@@ -51,6 +55,11 @@ class Robot:
     def name(self) -> str:
         """What the model calls itself."""
         return self.file.name
+
+    @property
+    def metre(self) -> float:
+        """Metres of the robot's that one of the uniform person's becomes: the lengths of their legs."""
+        return read_body(self.skeleton).leg / read_body(SMPL22).leg
 
     def told(self) -> tuple[str, ...]:
         """What a user should know: which hinges are which, and what the file lacks."""
@@ -133,7 +142,7 @@ class _Reading:
         model = self._with_sites(places, bodies)
         notes = (*self.file.notes, *notes)
         corners = {side: soles[side] - places[f"{side}_ankle"] for side in SIDES}
-        return Robot(self.file, self.parts, model, skeleton, self._home(), corners, notes)
+        return Robot(self.file, self.parts, model, skeleton, self._home(), corners, self._rolls(), notes)
 
     def _pose(self) -> None:
         mujoco = load_mujoco()
@@ -276,6 +285,19 @@ class _Reading:
             ends = np.array([half, -half]) @ turn.T + place
             points.append(ends - [0, 0, float(size[0])])
         return np.concatenate(points) if points else np.zeros((0, 3))
+
+    def _rolls(self) -> dict[str, tuple[float, float]]:
+        found: dict[str, tuple[float, float]] = {}
+        for side in SIDES:
+            found[side] = (-np.inf, np.inf)
+            for hinge in self.parts.hinges[f"{side}_ankle"]:
+                ahead, row = float(self.data.xaxis[hinge.joint][0]), self.file.hinges.index(hinge)
+                if abs(ahead) > 0.7:
+                    ends = (np.array([self.file.lower[row], self.file.upper[row]]) - self.qpos[7 + row]) * np.sign(
+                        ahead
+                    )
+                    found[side] = (float(ends.min()), float(ends.max()))
+        return found
 
     def _check_size(self, places: dict[str, Array]) -> None:
         leg = sum(

@@ -41,6 +41,12 @@ class Clip:
     def __len__(self) -> int:
         return len(self.qpos)
 
+    def frames(self, start: int, stop: int) -> "Clip":
+        """Frames ``start`` to ``stop`` (half-open)."""
+        some = slice(start, stop)
+        errors = None if self.errors is None else self.errors[some]
+        return replace(self, qpos=self.qpos[some], planted=self.planted[some], errors=errors)
+
 
 def put_on_robot(
     motion: Motion,

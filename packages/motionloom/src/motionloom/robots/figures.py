@@ -18,6 +18,8 @@ NEAR_LIMIT = 0.01
 """Radians from a limit at which a hinge counts as being there."""
 _TOUCHING = 0.002
 """Metres by which geoms are in each other before that counts."""
+ROOT_JUMPS = 1000.0
+"""Centimetres per second of the root that no humanoid does."""
 _LOW, _SLOW = 0.02, 0.3
 """Metres and metres per second: a part of a sole that is lower and slower is planted, where nobody says."""
 
@@ -36,6 +38,8 @@ class Figures:
     """How far what is planted of a sole moves along the ground in a frame."""
     sunk_cm: float
     """How deep the lowest corner of a sole ever is in the ground."""
+    sole_roll: float
+    """Radians by which a planted sole stands on one of its sides: in wide stances, where the ankle rolls no further."""
     planted_share: float
     """Share of frames with a foot on the ground."""
     limits_broken: int
@@ -44,11 +48,14 @@ class Figures:
     """Share of frames with a hinge at its limit."""
     largest_step: float
     """Radians that a hinge moves in a frame at most."""
+    root_step_cm: float
+    """How far the root moves in a frame at most, and by how many radians it turns."""
+    root_turn: float
     top_speed: float
     """Radians per second of the fastest hinge, and its name."""
     fastest: str
     speed_share: float | None
-    """Top speed in shares of the hinge's own limit; None where the model has none."""
+    """Top speed in shares of the hinge's own limit; None where neither the model states one nor was one given."""
     effector_cm: float | None
     """Median distance of hands and feet from where they were to be; None where only the angles are known."""
     outside_support_share: float
@@ -73,6 +80,8 @@ class Figures:
             found.append(f"soles are {self.sunk_cm:.1f} cm in the ground")
         if self.largest_step * self.fps > 15.001:
             found.append(f"{self.fastest} jumps {self.largest_step:.2f} rad in a frame")
+        if self.root_step_cm * self.fps > ROOT_JUMPS or self.root_turn * self.fps > 15.001:
+            found.append(f"the root jumps {self.root_step_cm:.1f} cm and {self.root_turn:.2f} rad in a frame")
         if self.speed_share is not None and self.speed_share > 1.001:
             found.append(f"{self.fastest} is {self.speed_share:.2f} times as fast as it can be")
         if self.effector_cm is not None and self.effector_cm > 6.0:
@@ -82,8 +91,8 @@ class Figures:
         return found
 
 
-def measure(clip: Clip, robot: Robot) -> Figures:
-    """The figures of a clip."""
+def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figures:
+    """The figures of a clip. max_speed: radians per second that no hinge is to exceed, beside what the model states."""
     corners, masses, touching = _followed(clip, robot)
     planted = clip.planted
     edges = np.stack([corners[:, :, :2].mean(axis=2), corners[:, :, 2:].mean(axis=2)], axis=2)
@@ -91,12 +100,16 @@ def measure(clip: Clip, robot: Robot) -> Figures:
     moved = np.linalg.norm(np.diff(edges[..., :2], axis=0), axis=-1)[stays]
     stands = planted[..., 0] | planted[..., 1]
     heights = corners[..., 2].min(axis=2)
+    across = corners[:, :, 1] - corners[:, :, 0]
+    slopes = across[..., 2] / np.linalg.norm(across, axis=-1)
     angles = clip.qpos[:, 7:]
     lower, upper = robot.file.lower, robot.file.upper
     speeds = np.abs(np.diff(angles, axis=0)) * clip.fps if len(clip) > 1 else np.zeros((1, angles.shape[1]))
     top = speeds.max(axis=0)
-    share = top / robot.file.speed
-    fastest = int((share if np.isfinite(robot.file.speed).any() else top).argmax())
+    most = robot.file.speed if max_speed is None else np.minimum(robot.file.speed, max_speed)
+    share = top / most
+    fastest = int((share if np.isfinite(most).any() else top).argmax())
+    root_step, root_turn = _root_steps(clip.qpos[:, :7])
     supported = stands[:, 0] | stands[:, 1]
     outside = [_outside(masses[f], corners[f][stands[f]].reshape(-1, 3)) for f in np.flatnonzero(supported)]
     return Figures(
@@ -107,12 +120,15 @@ def measure(clip: Clip, robot: Robot) -> Figures:
         float_cm=_high(100 * heights[stands]),
         slide_cm=_high(100 * moved),
         sunk_cm=round(100 * max(0.0, -float(heights.min())), 3),
+        sole_roll=_high(np.arcsin(slopes.clip(-1, 1))[stands]),
         planted_share=round(float(supported.mean()), 3),
         limits_broken=int(((angles < lower - 1e-9) | (angles > upper + 1e-9)).sum()),
         at_limit_share=round(
             float(((angles < lower + NEAR_LIMIT) | (angles > upper - NEAR_LIMIT)).any(axis=1).mean()), 3
         ),
         largest_step=round(float(top.max()) / clip.fps, 4),
+        root_step_cm=round(100 * root_step, 3),
+        root_turn=round(root_turn, 4),
         top_speed=round(float(top[fastest]), 3),
         fastest=robot.file.hinges[fastest].name,
         speed_share=round(float(share[fastest]), 4) if share[fastest] > 0 else None,
@@ -120,6 +136,13 @@ def measure(clip: Clip, robot: Robot) -> Figures:
         outside_support_share=round(float(np.mean(outside)), 3) if outside else 0.0,
         collision_frames=None if touching is None else int(touching.sum()),
     )
+
+
+def _root_steps(root: Array) -> tuple[float, float]:
+    """The most that root places and quaternions (frames, 7) move and turn in a frame: metres and radians."""
+    moved = np.linalg.norm(np.diff(root[:, :3], axis=0), axis=1)
+    turned = np.abs((root[1:, 3:] * root[:-1, 3:]).sum(axis=1)).clip(0, 1)
+    return float(moved.max(initial=0.0)), float(2 * np.arccos(turned.min(initial=1.0)))
 
 
 def _high(values: Array) -> float:

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.npz import read_arrays
+from motionloom.motion import Motion
 from motionloom.reading import read_bytes
-from motionloom.robots.body import Robot
+from motionloom.robots.body import Robot, read_robot, to_motion
 from motionloom.robots.clip import FPS, Clip, velocities
 from motionloom.robots.figures import planted_soles
 
@@ -67,6 +68,16 @@ def is_clip(path: Path) -> bool:
     if path.suffix.lower() != ".npz":
         return path.suffix.lower() == ".csv"
     return "qpos" in read_arrays(path, only=("qpos",)) if path.is_file() else False
+
+
+def load_motion(path: Path | str, robot: Robot | Path | str, *, fps: float | None = None) -> Motion:
+    """Read a CSV or an NPZ of a robot's joint angles as motion of its skeleton, in metres, +Y up.
+
+    robot: its model's file, or as it was read. fps, errors: as of `load_clip`, and of `read_robot` for a model's file.
+    """
+    known = robot if isinstance(robot, Robot) else read_robot(robot)
+    clip = load_clip(path, known, fps=fps)
+    return to_motion(known, clip.qpos, clip.fps)
 
 
 def load_clip(path: Path | str, robot: Robot, *, fps: float | None = None) -> Clip:

@@ -67,12 +67,12 @@ class _Renderer:
         shown = read_robot(robot.file.path, meshes=True, override=robot.map)
         self.model = _clothed(shown)
         self.data, self.camera = mujoco.MjData(self.model), mujoco.MjvCamera()
-        self.camera.distance, self.camera.azimuth, self.camera.elevation = 1.9 * _tall(robot), 130, -12
+        self.camera.distance, self.camera.azimuth, self.camera.elevation = 2.1 * _tall(robot), 130, -12
         try:
             self.renderer = mujoco.Renderer(self.model, size[1], size[0])
         except Exception as error:  # each backend of OpenGL has exceptions of its own
             raise _NoRenderer(str(error).split("\n")[0][:80] or type(error).__name__) from None
-        self.height = 0.5 * _tall(robot)
+        self.height = 0.55 * _tall(robot)  # raised hands are seen too
 
     def __enter__(self) -> "_Renderer":
         return self
@@ -123,6 +123,8 @@ def _clothed(robot: Robot) -> Any:
     if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.86, 0.87, 0.88, 1])
         spec.worldbody.add_light(pos=[0, 0, 4], dir=[0, 0, -1])
+    for light in spec.lights:
+        light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM  # as bright where the robot has gone
     for texture in list(spec.textures):
         if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
             spec.delete(texture)

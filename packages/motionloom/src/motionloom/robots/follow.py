@@ -15,7 +15,7 @@ from motionloom.robots.clip import check_settings
 from motionloom.robots.feet import EASE, ROLLING, angles, lowest, turned_by
 from motionloom.robots.joints import SIDES
 from motionloom.robots.solve import Solver
-from motionloom.robots.targets import Targets, lack, lowered
+from motionloom.robots.targets import Targets, lack, lowered, rolled
 
 Array = NDArray[np.float64]
 _BEGINS, _ENDS = (0.03, 0.4), (0.05, 0.8)
@@ -58,7 +58,7 @@ class Follower:
         targets = Targets(self.fps, robot.skeleton.names, places, turns, self.planted[None])
         need, most = float(lack(targets, robot)[0]), _DOWN / self.fps
         self._down = float(np.clip(need, self._down - most, self._down + most))
-        return self._solver.frame(lowered(targets, np.array([self._down])), 0)
+        return self._solver.frame(rolled(lowered(targets, np.array([self._down])), robot), 0)
 
 
 class _Foot:

@@ -84,8 +84,11 @@ def read_model(path: Path | str, *, meshes: bool = False) -> Model:
         spec = mujoco.MjSpec.from_file(str(path))
         notes = [*_without_meshes(spec, path, meshes), *_free_root(spec, path)]
         model = spec.compile()
+    except MotionloomError:
+        raise
     except (ValueError, RuntimeError) as error:
-        raise MotionloomError(f"{path} is no model that MuJoCo reads: {one_line(str(error))[:300]}") from None
+        said = one_line(" ".join(str(error).split()))[:300]
+        raise MotionloomError(f"{path} is no model that MuJoCo reads: {said}") from None
     hinges = _hinges(model, path)
     if not model.nu:
         notes.append(f"{path} has no actuators; that matters for --physics alone, where no force is limited then")
@@ -100,6 +103,8 @@ def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
     mujoco = load_mujoco()
 
     folder = path.parent / spec.meshdir
+    for mesh in spec.meshes:
+        mesh.file = _in_package(mesh.file, path)
     missing = {mesh.name: mesh.file for mesh in spec.meshes if mesh.file and not (folder / mesh.file).is_file()}
     heavy = all(body.explicitinertial for body in spec.bodies if body.parent is not None)  # without its geoms
     for geom in list(spec.geoms):
@@ -118,6 +123,20 @@ def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
         return []
     first = next(iter(missing.values()))
     return [f"{len(missing)} of the meshes of {path} are not there (such as {first}); the robot does without them"]
+
+
+def _in_package(name: str, path: Path) -> str:
+    """The file of a mesh that a URDF names by its ROS package, which is the model's folder or one above; else the
+    name."""
+    if not name.startswith("package://"):
+        return name
+    package, _, inside = name.removeprefix("package://").partition("/")
+    roots = path.resolve().parents
+    found = [above / inside for above in roots if above.name == package] + [
+        roots[0] / inside,
+        roots[0] / package / inside,
+    ]
+    return next((str(one) for one in found if one.is_file()), name)
 
 
 def _free_root(spec: Any, path: Path) -> list[str]:

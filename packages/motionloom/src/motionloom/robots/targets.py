@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 STRAIGHTEST = 0.985
 """Share of a leg's length that hip and ankle are apart at most: nearer to 1 knees snap."""
+_ROLL_LEFT = 0.02
+"""Radians of an ankle's roll that are left for what the solver makes of it."""
 _LOWEST = 0.25
 """Share of a leg's length by which the pelvis goes down at most so that both feet reach."""
 
@@ -70,7 +72,7 @@ def aim(motion: Motion, robot: Robot, *, fps: float, source_map: Override | None
         turns_to_mujoco(motion.world_rotations()),
         planted.reshape(len(planted), 2, 2),
     )
-    return _reaching(_stepping(made, robot), robot)
+    return rolled(_reaching(_stepping(made, robot), robot), robot)
 
 
 def _stepping(targets: Targets, robot: Robot) -> Targets:
@@ -103,6 +105,23 @@ def lack(targets: Targets, robot: Robot) -> Array:
         most = (STRAIGHTEST * leg) ** 2 - (line[:, :2] ** 2).sum(axis=-1)
         need = np.maximum(need, -line[:, 2] - np.sqrt(most.clip(0)))
     return need.clip(0, _LOWEST * leg)
+
+
+def rolled(targets: Targets, robot: Robot) -> Targets:
+    """With soles on their inner edge where a leg stands out to the side further than its ankle rolls."""
+    places, turns = targets.places.copy(), targets.turns.copy()
+    for side in SIDES:
+        low, high = robot.rolls[side]
+        j, sole = targets.joints.index(f"{side}_ankle"), robot.soles[side]
+        up = rot.rotate(rot.inverse(turns[:, j]), targets.place(f"{side}_hip") - places[:, j])
+        lean = np.arctan2(up[:, 1], up[:, 2])  # of the leg, seen from the foot: what the ankle has to roll
+        upright = up[:, 2] / np.linalg.norm(up, axis=1)  # of a foot that swings behind, lean says nothing
+        over = (lean - lean.clip(low + _ROLL_LEFT, high - _ROLL_LEFT)) * ((upright - 0.5) / 0.25).clip(0, 1)
+        turned = rot.multiply(turns[:, j], rot.rotvec_to_quat(-over[:, None] * np.array([1.0, 0.0, 0.0])))
+        edge = np.where(over[:, None] < 0, sole[sole[:, 1].argmin()], sole[sole[:, 1].argmax()]) * [0.0, 1.0, 1.0]
+        places[:, j] += rot.rotate(turns[:, j], edge) - rot.rotate(turned, edge)
+        turns[:, j] = turned
+    return replace(targets, places=places, turns=turns)
 
 
 def lowered(targets: Targets, down: Array) -> Targets:

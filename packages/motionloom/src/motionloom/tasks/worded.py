@@ -105,19 +105,25 @@ class Worded:
 
 
 def read(
-    prior: Prior, text: str, seconds: float | None = None, *, parted: bool = True, amounts: bool = True
+    prior: Prior,
+    text: str,
+    seconds: float | None = None,
+    *,
+    parted: bool = True,
+    amounts: bool = True,
+    metre: float = 1.0,
 ) -> Timeline:
     """What a sentence asks of a prior: its numbers as goals and lengths, its actions as segments.
 
     seconds: of the whole; None: what the words say, or 5. parted: part what follows each other; otherwise it is parted
-    where one part has a number that is kept. amounts: read numbers. Weights that make no long motion get the sentence
-    as it is. Raises `MotionloomError` for what cannot be asked.
+    where one part has a number that is kept. amounts: read numbers. metre: as of `timelines.timeline_of`. Weights that
+    make no long motion get the sentence as it is. Raises `MotionloomError` for what cannot be asked.
     """
     whole = timelines.whole(text, timelines.SECONDS if seconds is None else seconds)
     frames_in(whole.segments[0].seconds, prior.fps)
     if (len(prior.mean), prior.fps) != (WIDTH, FPS) or whole.segments[0].seconds < timelines.SHORTEST:
         return whole
-    found = timelines.timeline_of(text, seconds, amounts=amounts)
+    found = timelines.timeline_of(text, seconds, amounts=amounts, metre=metre)
     return found if parted or found.readings or len(found.segments) == 1 else whole
 
 
