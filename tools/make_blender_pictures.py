@@ -7,7 +7,7 @@ other, and a person of ellipsoids with a rig that Rigify generates.
 
 bvh       a BVH as it comes in: bones stand upright, on the floor, facing Blender's front
 walking   a character's own file with a walk in it, at three moments
-rigify    the walk on the controls of a generated Rigify rig, by `examples/blender_rigify.py`
+rigify    the walk on the controls of a generated Rigify rig, by the extension in `blender/`
 """
 
 import json
@@ -26,7 +26,9 @@ from motionloom.io import save
 from motionloom.io.character import load_character
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from tests.io.rigify import example, make_rig
+from tests.addon.studio import Studio, archive
+from tests.io.rigify import make_rig
+from tests.server.serving import running
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
@@ -176,13 +178,11 @@ def draw(names: list[str], folder: Path) -> None:
         moving = hero.save(retarget(motion, hero.skeleton), folder / "moving.glb", name="walk", replace=True)
         kept(rendered(moving, view(motion)), "walking")
     if "rigify" in names:
-        blend, glb = make_rig(folder / "rig.blend"), folder / "rig.glb"
-        example(blend, "out", str(glb))
-        character = load_character(glb)
-        made = retarget(motion, character.skeleton)
-        moving = character.save(made, folder / "moving_rig.glb", name="walk", replace=True)
-        example(blend, "in", str(moving), str(folder / "moving_rig.blend"))
-        kept(rendered(folder / "moving_rig.blend", view(made)), "rigify")
+        blend, out = make_rig(folder / "rig.blend"), folder / "moving_rig.blend"
+        with running(folder / "project") as server:
+            studio = Studio(server, archive(folder), folder)
+            studio.play("saved", blend=str(blend), out=str(out), prompt="a person walks forward", seconds=3.0)
+        kept(rendered(out, view(motion)), "rigify")
 
 
 if __name__ == "__main__":

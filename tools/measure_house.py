@@ -23,8 +23,9 @@ SOURCES = {
     "": ROOT / "packages" / "motionloom" / "src" / "motionloom",
     "train": ROOT / "packages" / "motionloom-train" / "src" / "motionloom_train",
     "lab": ROOT / "packages" / "motionloom-lab" / "src" / "motionloom_lab",
+    "blender": ROOT / "blender",
 }
-"""The packages' folders; rooms of training and of the laboratory begin with these words."""
+"""The packages' folders and the extension's; rooms but those of the product begin with these words."""
 PARAMETERS, COMPLEXITY = 8, 20
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -98,7 +99,8 @@ def measured() -> dict[str, object]:
     """Everything, by name."""
     rooms, every = lines(), list(functions())
     packages = {
-        name: sum(count for room, count in rooms.items() if room.startswith(f"{name}/")) for name in ("train", "lab")
+        name: sum(count for room, count in rooms.items() if room.startswith(f"{name}/"))
+        for name in ("train", "lab", "blender")
     }
     many = [(parameters(node), place) for place, node in every if not node.name.startswith("_")]
     long = [((node.end_lineno or node.lineno) - node.lineno + 1, place) for place, node in every]
@@ -107,6 +109,7 @@ def measured() -> dict[str, object]:
         "product": sum(rooms.values()) - sum(packages.values()),
         "training": packages["train"],
         "laboratory": packages["lab"],
+        "extension": packages["blender"],
         f"public functions with more than {PARAMETERS} parameters": sorted(
             (one for one in many if one[0] > PARAMETERS), reverse=True
         ),

@@ -1,6 +1,6 @@
 """A person with a generated Rigify rig, made in Blender: an ellipsoid of skin around each deform bone but the face's.
 
-Needs bpy, as `in_blender` does; `examples/blender_rigify.py` is run there as a user runs it.
+Needs bpy, as `in_blender` does.
 """
 
 import subprocess
@@ -9,8 +9,6 @@ import tempfile
 from pathlib import Path
 
 from tests.io.in_blender import python_with_bpy
-
-EXAMPLE = Path(__file__).parents[4] / "examples" / "blender_rigify.py"
 
 _MAKE = """
 import sys
@@ -51,25 +49,11 @@ parts[0].modifiers.new("Armature", "ARMATURE").object = rig
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 """
 
-_RUN = """
-import runpy, sys
-import bpy
-example, blend, *words = sys.argv[1:]
-bpy.ops.wm.open_mainfile(filepath=blend)
-sys.argv = [example, "--", *words]
-runpy.run_path(example, run_name="__main__")
-"""
-
 
 def make_rig(blend: Path) -> Path:
     """The person as a .blend."""
     _blender(_MAKE, str(blend))
     return blend
-
-
-def example(blend: Path, *words: str) -> None:
-    """The example as a user runs it on a .blend, with the words behind ``--``."""
-    _blender(_RUN, str(EXAMPLE), str(blend), *words)
 
 
 def _blender(script: str, *words: str) -> None:

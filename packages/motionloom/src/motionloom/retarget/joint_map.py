@@ -184,8 +184,8 @@ def _trunk(skeleton: Skeleton, parts: Parts) -> tuple[int, int, list[int], int, 
         head = _spine_top(skeleton, chest)
     if head == chest and "DEF-spine" in skeleton.names:
         raise MotionloomError(
-            "the skeleton is a generated Rigify rig in pieces: its limbs do not hang on DEF-spine; take it out of "
-            "Blender with examples/blender_rigify.py (docs/blender.md)"
+            "the skeleton is a generated Rigify rig in pieces: its limbs do not hang on DEF-spine; move it with "
+            "the extension for Blender, which knows its controls (docs/blender.md)"
         )
     if head == chest:
         raise MotionloomError(

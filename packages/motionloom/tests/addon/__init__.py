@@ -1,0 +1,1 @@
+"""The Blender extension in Blender, against a real server."""
