@@ -14,7 +14,7 @@ from motionloom.goals.sequence import split_actions
 from motionloom.kinematics.physics import jerk, velocity
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks import best
-from motionloom.tasks.sampling import Rows, sample
+from motionloom.tasks.sampling import Rows, sample, with_best_seeds
 from motionloom.tasks.text import finish, frames_in, sample_features
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.obedience import EVERYDAY, Check
@@ -31,7 +31,7 @@ def measured(check: Check, positions: np.ndarray, fps: float) -> tuple[float, fl
 
 def main() -> None:
     """Print a line for each prompt and the means."""
-    prior, sampling = Prior.load("default"), Sampling()
+    prior, sampling = Prior.load("default"), Sampling(best_of=COUNT)
     rows = []
     print("prompt, seed | obeys, still, jerk: first | nearest to the mean | chosen")
     for check in EVERYDAY[::EVERY]:
@@ -42,9 +42,9 @@ def main() -> None:
             seeds = [seed, *(row_seed(seed, number) for number in range(1, COUNT))]
             asked = Rows([check.prompt] * COUNT, [frames] * COUNT, seeds)
             estimates = dict(sample(prior, asked, sampling, halfway=True))
-            mean = best._mean(prior, check.prompt, frames, seeds, sampling)
+            mean = best._mean(prior, check.prompt, frames, seeds, sampling.levels(prior.schedule)[0])
             away = [best._distance(estimates[number], mean) for number in range(COUNT)]
-            chosen = best.with_best_seeds(prior, Rows([check.prompt], [frames], [seed]), COUNT, sampling).seeds[0]
+            chosen = with_best_seeds(prior, Rows([check.prompt], [frames], [seed]), sampling).seeds[0]
             picked = [0, away.index(min(away)), seeds.index(chosen)]
             made = sample_features(prior, asked.prompts, asked.lengths, seeds=seeds)
             found = {

@@ -54,7 +54,7 @@ BUDGETS = {
     "lab/(top)": 2,
 }
 """Canonical lines per room (`tools/measure_house.py`), of 2026-11-24. They only go down: a room that needs more says
-why in docs/architecture.md, and its number is raised there and then."""
+why in docs/map.md, and its number is raised there and then."""
 
 
 def run(*command: str) -> subprocess.CompletedProcess[str]:

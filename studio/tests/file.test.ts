@@ -3,6 +3,7 @@ import { putTarget } from "../src/project/asks";
 import { ProjectError, read, stampOf, written } from "../src/project/file";
 import { exampleProject } from "../src/project/model";
 import { halfSeconds, snap } from "../src/project/snap";
+import { takeOf } from "../src/server/api";
 import { events } from "../src/server/events";
 
 describe("a project file", () => {
@@ -16,6 +17,16 @@ describe("a project file", () => {
     expect(read(file)).toEqual(project);
     expect(JSON.parse(file)).toMatchObject({ version: 2, id: "film", revision: 7 });
     expect(stampOf(JSON.parse(file))).toEqual({ id: "film", revision: 7 });
+  });
+
+  it("keeps what is told of a take", () => {
+    const result = { id: "0123456789abcdef", seed: 4, seconds: 2, frames: 40, people: 2 };
+    const happened = [{ sentence: "walks 2.0 m forward" }, null];
+    const take = takeOf({ ...result, happened, remarks: ["3 steps asked; 4 steps drawn"] }, "drawn");
+    expect(take.told).toEqual(["Person 1 walks 2.0 m forward", "3 steps asked; 4 steps drawn"]);
+    const project = { ...exampleProject(), takes: [take] };
+    expect(read(written(project, { id: "film", revision: 1 })).takes).toEqual([take]);
+    expect(takeOf(result, "drawn").told).toEqual([]);
   });
 
   it("of version 1 is read as one of today, and says no id", () => {

@@ -42,6 +42,7 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
         ),
       ),
     ),
+    ...(project.takes[project.kept]?.told ?? []).map((one) => h("p", { class: "quiet told" }, one)),
     clips.length > 1 &&
       h("div", { class: "row" }, textButton("Side by side", actions.beside!.run, { pressed: sideBySide, title: "B" })),
     h(

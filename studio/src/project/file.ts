@@ -151,6 +151,9 @@ function take(found: unknown, name: string) {
     seconds: number(given.seconds, `${name}.seconds`, 1 / FPS, 86400),
     people: number(given.people ?? 1, `${name}.people`, 1, 2),
     how: word(given.how ?? "drawn", `${name}.how`),
+    ...(given.told == null
+      ? {}
+      : { told: list(given.told, `${name}.told`, 100).map((one) => word(one, `${name}.told`)) }),
   };
 }
 

@@ -81,6 +81,8 @@ export interface Take {
   readonly people: number;
   /** In words, how it was made: "drawn", "redrawn", "continued", ... */
   readonly how: string;
+  /** What happens in it, as it was measured, and what is remarked on its words: a sentence each. */
+  readonly told?: readonly string[];
 }
 
 /** A motion from a file, or one that was put aside. */

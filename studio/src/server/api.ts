@@ -13,12 +13,17 @@ export interface Result {
   readonly seconds: number;
   readonly frames: number;
   readonly people: number;
+  /** What each person did, as it was measured. */
+  readonly happened?: readonly ({ readonly sentence: string } | null)[];
+  readonly remarks?: readonly string[];
 }
 
 export interface JobState {
   readonly id: string;
   readonly state: string;
   readonly error: string | null;
+  /** How the words were read, and which of them nobody learned. */
+  readonly remarks?: readonly string[];
   readonly results: readonly Result[];
 }
 
@@ -129,7 +134,9 @@ export async function timelineJson(yaml: Blob): Promise<unknown> {
 }
 
 export function takeOf(result: Result, how: string): Take {
-  return { motion: result.id, seed: result.seed, seconds: result.seconds, people: result.people, how };
+  const { id, seed, seconds, people, happened = [], remarks = [] } = result;
+  const deeds = happened.map((one, who) => one && `${people > 1 ? `Person ${who + 1} ` : ""}${one.sentence}`);
+  return { motion: id, seed, seconds, people, how, told: [...deeds.filter((one) => one !== null), ...remarks] };
 }
 
 /** Little-endian float32 in base64. */

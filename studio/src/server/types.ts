@@ -15,8 +15,6 @@ export interface GenerateRequest {
   readonly as_one?: boolean;
   /** do not read numbers as goals: '3 meters', 'turns left 90 degrees' */
   readonly literal?: boolean;
-  /** of each motion begin so many and keep the one that does most of what its words allow to check */
-  readonly best_of?: number;
   /** the first motion's seed, the next have the next */
   readonly seed?: number;
   /** motions to make */
@@ -25,6 +23,8 @@ export interface GenerateRequest {
   readonly guidance?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   readonly solver?: Solver;
   /** make the end meet the beginning */
   readonly loop?: boolean;
@@ -48,6 +48,8 @@ export interface ComposeRequest {
   readonly count?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -78,6 +80,8 @@ export interface ControlRequest {
   readonly guidance?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -112,6 +116,8 @@ export interface EditRequest {
   readonly guidance?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -138,6 +144,8 @@ export interface PredictRequest {
   readonly guidance?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   /** livelier and more varied above 1, calmer below */
   readonly temperature?: number;
   /** make the end meet the beginning */
@@ -171,6 +179,8 @@ export interface SwitchRequest {
   readonly guidance?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   /** livelier and more varied above 1, calmer below */
   readonly temperature?: number;
   /** make the end meet the beginning */
@@ -213,6 +223,8 @@ export interface DuetRequest {
   readonly count?: number;
   /** network calls per motion: fewer is faster */
   readonly steps?: number;
+  /** of each motion begin so many and keep the one that does most of what its words allow to check */
+  readonly best_of?: number;
   /** how firmly two people keep to where the block wants them: 0 lets them drift apart, as published */
   readonly pair_guidance?: number;
   /** keep bodies out of each other, and bring hands together that the words say meet */

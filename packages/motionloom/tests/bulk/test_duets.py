@@ -49,7 +49,7 @@ def apart(a: Any, b: Any) -> float:
 def test_a_duet_is_that_of_the_single_task_whatever_is_beside_it(ready: Maker) -> None:
     other = DUET | {"seed": 4}
     (alone,) = made(ready, DUET)
-    single = generate_pair(ready.prior, ready._block, DUET["prompt"], seconds=1.0, seed=3, steps=2)[0]
+    single = generate_pair(ready.prior, ready.models.block, DUET["prompt"], seconds=1.0, seed=3, steps=2)[0]
     assert apart(alone.people, single) == 0
     both = made(ready, other, {"prompt": "a person walks", "seconds": 1}, DUET)
     assert [len(one.people) for one in both] == [1, 2, 2]
@@ -173,7 +173,7 @@ def test_goals_and_timelines_of_two_people(ready: Maker, folder: Path) -> None:
                 one.people,
                 generate_pair(
                     ready.prior,
-                    ready._block,
+                    ready.models.block,
                     DUET["prompt"],
                     goals=(None, goal) if person else (goal, None),
                     seed=3,

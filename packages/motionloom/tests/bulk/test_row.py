@@ -97,8 +97,8 @@ def test_the_id_of_a_row_without_the_best_of_several_is_as_it_was() -> None:
     assert key(row) == "e8bbc60dcbb26cb823371c1c56e4c869"  # recorded before rows had it
     assert key(row | {"best_of": 1}) == key(row, best_of=1) == key(row)
     assert key(row | {"best_of": 4}) == key(row, best_of=4) != key(row)
-    with pytest.raises(MotionloomError, match="'best_of' chooses among motions of a prompt"):
-        parse(json.dumps({"prompt": "a", "goal": {"path": {"points": [[0, 0], [0, 2]]}}, "best_of": 2}).encode())
+    with pytest.raises(MotionloomError, match="a row with a motion draws nothing"):
+        parse(json.dumps({"motion": "a.bvh", "best_of": 2}).encode())
 
 
 def test_the_id_changes_with_what_a_named_file_holds(folder: Path) -> None:

@@ -30,7 +30,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the command asked of the maker of motion, which walks 1 m a second along +Z and stops where it is told."""
     seen: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def compose(prior, segments, *, seed=0, guidance=2.5, steps=24, start, path, foot_lock, progress):
+    def compose(prior, segments, *, seed=0, guidance=2.5, steps=24, best_of, start, path, foot_lock, progress):
         seen.update(
             segments=segments, seed=seed, guidance=guidance, steps=steps, start=start, path=path, foot_lock=foot_lock
         )

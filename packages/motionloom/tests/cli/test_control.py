@@ -34,14 +34,17 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list:
     """What the command asks of the task, which here only stands there, 1 cm beside its goals."""
     calls = []
 
-    def fake(prior, prompt, goal, *, count, fit, foot_lock, progress, adapters="none", **settings):
+    def fake(prior, prompt, goal, *, sampling, fit, foot_lock, progress, adapters):
+        names = ("count", "first", "seed", "guidance", "steps", "best_of")
         calls.append(
-            {"prompt": prompt, "goal": goal, "count": count, "fit": fit, "foot_lock": foot_lock, "adapters": adapters}
-            | settings
+            {"prompt": prompt, "goal": goal, "fit": fit, "foot_lock": foot_lock, "adapters": adapters}
+            | {name: getattr(sampling, name) for name in names}
         )
         progress(1, 1)
         motion = Motion(SMPL22, 20.0, np.tile([0.0, 0.9, 0], (len(goal), 1)), np.tile(IDENTITY, (len(goal), 22, 1)))
-        return [task.Controlled(motion, motion, 0.01, 0.43, ("head at 1.20 s is 0.43 m away from its goal",))] * count
+        return [
+            task.Controlled(motion, motion, 0.01, 0.43, ("head at 1.20 s is 0.43 m away from its goal",))
+        ] * sampling.count
 
     monkeypatch.setattr(task, "control", fake)
     return calls
@@ -75,6 +78,7 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
         "seed": 5,
         "guidance": 3.0,
         "steps": 7,
+        "best_of": 1,
         "fit": False,
         "foot_lock": False,
         "adapters": "none",
@@ -121,6 +125,7 @@ def test_a_path_elsewhere_moves_the_start_of_somebody_who_follows(weights: str, 
 def test_the_report_is_json_when_asked(weights: str, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
     assert control(weights, "walk", "--goal", "goal.json", "--json", "--out", "a.npz", "--fps", "30") == 0
     about = json.loads(capsys.readouterr().out)
+    assert [one.pop("happened")[0]["ends"] for one in about["motions"]] == ["standing"]
     assert about["motions"] == [
         {
             "prompt": "walk",

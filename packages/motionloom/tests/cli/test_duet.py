@@ -9,6 +9,7 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.requests.sampling import PairSampling
 from motionloom.runtime.text.known import known_sentences
 from motionloom.tasks import pair
 from motionloom.weights.prior import save_prior
@@ -176,8 +177,8 @@ def test_how_firmly_the_two_stay_together_changes_what_is_drawn(files: Path, nam
 def test_how_firmly_the_two_stay_together_is_asked_behind_a_past_too(files: Path, monkeypatch) -> None:
     asked = []
 
-    def complete(*_, pair_guidance: float, **__):
-        asked.append(pair_guidance)
+    def complete(*_, sampling: PairSampling, **__):
+        asked.append(sampling.pair_guidance)
         return [walkers(1.0)]
 
     monkeypatch.setattr(pair, "complete_pair", complete)

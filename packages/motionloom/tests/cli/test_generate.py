@@ -135,9 +135,7 @@ def test_bytes_that_are_no_text_do_not_break_it(weights: str) -> None:
     assert written() == {"a.npz"}
 
 
-def test_the_best_of_several_is_kept_for_single_actions_and_the_rest_is_told(
-    weights: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_best_of_several_is_kept(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     different = 0
     for seed in ("1", "2", "3"):
         for options, name in ((("--best-of", "4"), "a.npz"), (("--best-of", "4"), "b.npz"), ((), "c.npz")):
@@ -147,8 +145,6 @@ def test_the_best_of_several_is_kept_for_single_actions_and_the_rest_is_told(
         different += largest_distance(a, c) > 1e-3
     assert different
     assert "--best-of" not in capsys.readouterr().err
-    assert main(["generate", "a person walks, then sits", "--weights", weights, "--steps", "2", "--best-of", "3"]) == 0
-    assert "--best-of is for one action; these are drawn as they come" in capsys.readouterr().err
     for words in ("a person walks", "a person walks, then sits"):
         assert main(["generate", words, "--weights", weights, "--out", "d.npz", "--best-of", "99"]) == 2
         assert complaint(capsys).startswith("motionloom: --best-of must be a whole number from 1 to 16; got 99")

@@ -252,6 +252,25 @@ def test_files_that_are_no_goals(tmp_path: Path, text: str, said: str) -> None:
         read_goal(file, frames=100, folder=tmp_path)
 
 
+def test_a_mistake_in_a_file_names_line_and_key_and_editors_may_be_told_the_schema(tmp_path: Path) -> None:
+    file = tmp_path / "goal.json"
+    lines = [
+        '{"$schema": "goal.schema.json",',
+        ' "joints": [',
+        '  {"joint": "head",',
+        '   "points": [{"time": 1, "position": 3}]}]}',
+    ]
+    file.write_text("\n".join(lines))
+    with pytest.raises(MotionloomError, match=r"goal\.json, line 4: 'joints\[0\]\.points\[0\]\.position' must be"):
+        read_goal(file, frames=100, folder=tmp_path)
+    file.write_text("\n".join(lines).replace("3}", "[0, 1.5, 0]}"))
+    assert read_goal(file, frames=100, folder=tmp_path).joints == ("head",)
+    assert fits(json.loads(file.read_text()), WHOLE, WHOLE)
+    file.write_text('{\t"path": 3}')
+    with pytest.raises(MotionloomError, match=r"goal\.json(, line 1)?: 'path' must be"):
+        read_goal(file, frames=100, folder=tmp_path)
+
+
 def test_a_large_file_and_a_link_outwards_are_not_read(folder: Path, tmp_path: Path) -> None:
     with (tmp_path / "goal.json").open("wb") as file:
         file.truncate(17_000_000)

@@ -79,9 +79,9 @@ def test_commands_are_asked_before_the_frame_of_their_time() -> None:
         ("people: 2\nseconds: 2\ncommands:\n- {at: 1, say: 'a :: b :: c'}", "line 4: the prompt 'a :: b :: c'"),
         ("seconds: 2\ncommands:\n- {at: 1, fly: up}", "line 3: unknown key 'fly'"),
         ("seconds: 2\ncommands:\n- {at: 1, steer: 3}", "line 3: 'steer' must be a mapping"),
-        ("seconds: 2\ncommands:\n- {at: 1, steer: {speed: 99}}", "line 3: a speed of 99 m/s"),
-        ("seconds: 2\ncommands:\n- {at: 1, path: {points: []}}", "line 3: a path of 0 points"),
-        ("seconds: 2\ncommands:\n- {at: 1, say: {a: 1}}", "line 3: what is done is said in words"),
+        ("seconds: 2\ncommands:\n- {at: 1, steer: {speed: 99}}", "line 3: 'speed' must be 0 to 12 m/s; got 99"),
+        ("seconds: 2\ncommands:\n- {at: 1, path: {points: []}}", "line 3: points must be a list"),
+        ("seconds: 2\ncommands:\n- {at: 1, say: {a: 1}}", "line 3: 'text' must be text"),
         ("seconds: 2\ncommands:\n- {at: 1, reach: {joint: tail, position: [0, 1, 0]}}", "line 3: no joint 'tail'"),
     ],
 )

@@ -80,6 +80,15 @@ def test_assistants_have_a_tool_for_every_task(tmp_path: Path) -> None:
         assert set(inspect.signature(tools.tool(task)).parameters) == set(specs(request))
 
 
+def test_the_picture_of_the_architecture_is_that_of_the_code() -> None:
+    drawn = runpy.run_path(str(ROOT / "tools" / "draw_architecture.py"))
+    assert drawn["PLACE"].read_text(encoding="utf-8") == drawn["picture"](), "run tools/draw_architecture.py"
+    rooms = {place.split("/")[0] for _, place in drawn["DOORS"] if "/" in place}
+    rooms |= {one.strip().split("/")[0] for _, places, _ in drawn["STEPS"] for one in places.split(",")}
+    package = ROOT / "packages" / "motionloom" / "src" / "motionloom"
+    assert [room for room in rooms if not (package / room).is_dir()] == []
+
+
 def test_the_schema_of_timeline_files_is_what_the_fields_say() -> None:
     pytest.importorskip("starlette", reason="needs the extra 'studio'")
     written = runpy.run_path(str(ROOT / "tools" / "write_types.py"))

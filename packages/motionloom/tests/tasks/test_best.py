@@ -1,13 +1,14 @@
 """Best of several seeds: which is kept, that it depends on its own motion alone, and what cannot be asked."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from motionloom.diffusion.sampling import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.requests.sampling import Sampling
-from motionloom.tasks.best import with_best_seeds
-from motionloom.tasks.sampling import Rows, sample
+from motionloom.tasks.sampling import Rows, sample, with_best_seeds
 from motionloom.tasks.text import finish, generate, sample_features
 from motionloom.weights.prior import Prior
 from tests.noise import normal
@@ -24,7 +25,7 @@ def prior() -> Prior:
 
 
 def best(prior: Prior, prompts: list[str], seeds: list[int], count: int = 4) -> list[int]:
-    return list(with_best_seeds(prior, Rows(prompts, [12] * len(seeds), seeds), count, SAMPLING).seeds)
+    return list(with_best_seeds(prior, Rows(prompts, [12] * len(seeds), seeds), replace(SAMPLING, best_of=count)).seeds)
 
 
 def test_of_equals_the_one_nearest_to_the_mean_at_pure_noise_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -36,7 +37,7 @@ def test_of_equals_the_one_nearest_to_the_mean_at_pure_noise_is_kept(monkeypatch
     halfway = dict(sample(prior, Rows([TURN] * 5, [40] * 5, tried), SAMPLING, halfway=True))
     away = [float(((halfway[i] - mean)[:, ROT6D] ** 2).mean()) for i in range(5)]
     assert sorted(away)[1] - min(away) > 1e-3  # no tie
-    kept = with_best_seeds(prior, Rows([TURN], [40], [7]), 5, SAMPLING).seeds
+    kept = with_best_seeds(prior, Rows([TURN], [40], [7]), replace(SAMPLING, best_of=5)).seeds
     assert kept == [tried[away.index(min(away))]]
 
 

@@ -37,7 +37,7 @@ from motionloom.diffusion import (
     run,
 )
 from motionloom.errors import MotionloomError
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, smooth
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING
 from motionloom.weights.prior import Prior
 
 HANDSHAKE = 20
@@ -412,8 +412,7 @@ def double_take_features(
             solver=walker,
             second_take_only=second_take_only,
         ).unfolded
-    finished = made[0] * prior.std + prior.mean
-    return smooth(finished) if prior.net.config.patch > 1 else finished, plan.ends
+    return prior.to_features(made[0]), plan.ends
 
 
 def _with_text(

@@ -14,7 +14,7 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH as ROWS
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.sampling import Observed
-from motionloom.tasks.text import sample_features, smooth, to_motion
+from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.adapter import Adapter, adapted, adapters
 from motionloom.weights.prior import Prior
 from motionloom_lab.papers.diffusion_blending import control_features
@@ -109,9 +109,7 @@ def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise
             given = np.stack([target.known for target in some]).astype(np.float32)
             known = Observed((given - prior.mean) / prior.std, mask, noise_free)
             prompts, own = [target.prompt for target in some], [seeds[row] for row in rows]
-            drawn = control_features(prior, nets, prompts, known, seeds=own, **how) * prior.std + prior.mean
-            if prior.net.config.patch > 1:
-                drawn = smooth(drawn)  # as everything that such a network draws
+            drawn = prior.to_features(control_features(prior, nets, prompts, known, seeds=own, **how))
             fixed = np.where(mask, given, drawn).astype(np.float64)
             result |= {row: of_features(one) for row, one in zip(rows, fixed, strict=True)}
         return [result[row] for row in range(len(targets))]

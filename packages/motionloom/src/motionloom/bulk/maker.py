@@ -3,7 +3,6 @@
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,27 +17,20 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.goal import start_of
 from motionloom.goals.roles import prompts_of
-from motionloom.goals.timeline import Timeline
 from motionloom.io import load
-from motionloom.io.stream import joined
 from motionloom.motion import Motion
-from motionloom.requests.sampling import Sampling
-from motionloom.retarget import retarget, to_smpl22
+from motionloom.requests.reading import make
+from motionloom.requests.sampling import PairSampling, Sampling
+from motionloom.requests.tasks import REQUESTS
+from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.adapting import adapt
-from motionloom.tasks.best import with_best_seeds
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
-from motionloom.tasks.duet import compose_pair
-from motionloom.tasks.edit import Loop, edit
-from motionloom.tasks.long import compose, with_loaded
-from motionloom.tasks.pair import Duet, generate_pair
-from motionloom.tasks.sampling import Rows
+from motionloom.tasks.run import Models, Plan, Result, closed, run
+from motionloom.tasks.sampling import Rows, with_best_seeds
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
-from motionloom.tasks.worded import draw
 from motionloom.weights.container import PAIRS, weights_digest
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior, find_weights
+from motionloom.weights.prior import find_weights
 
 TOGETHER = {"cpu": 8, "cuda": 128}
 """Rows of a network call, by the kind of device."""
@@ -79,6 +71,8 @@ class Options:
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
     hands: HandPose = "as-is"
     """Pose of the hands; a row whose skeleton has no fingers then fails."""
+    root: RootMode | None = None
+    """What carries the way on skeletons with a root bone; None: as `motionloom.retarget.retarget` does."""
     robot: str | None = None
     """A robot's model, onto which motions of rows go that name none and no skeleton; None: no robot."""
     robot_map: str | None = None
@@ -102,6 +96,7 @@ class Options:
         """What determines every motion of the batch; ``weights``: `hash_weights`."""
         later = {
             "hands": (self.hands, "as-is"),
+            "root": (self.root, None),
             "unit": (self.unit, 1.0),
             "literal": (self.literal, False),
             "loop": (self.loop, None),
@@ -186,7 +181,9 @@ class Maker:
             which = PAIRS.find(options.pair_weights)
             raise MotionloomError(f"{which} differs from what this batch is made with; use the same file")
         self.options = options
-        self.prior = adapt(Prior.load(path, device=options.device), [parse_adapter(one) for one in options.adapters])
+        adapters = [parse_adapter(one) for one in options.adapters]
+        self.models = Models(path, options.pair_weights, device=options.device, adapters=adapters)
+        self.prior = self.models.prior
         check(self.prior, [], steps=options.steps, guidance=options.guidance, solver=options.solver)
         check_features(self.prior)
         self.sources = Sources(
@@ -223,10 +220,10 @@ class Maker:
         plain = [one for one in asked if one.row.task == "generate" and one.timeline is None]
         for numbers in groups(self.prior, [one.frames for one in plain], together):
             yield [plain[number] for number in numbers]
-        same: dict[int, list[Asked]] = {}
+        same: dict[tuple[int, int], list[Asked]] = {}
         for one in asked:
             if one.row.task == "control":
-                same.setdefault(id(one.goal), []).append(one)
+                same.setdefault((id(one.goal), one.best_of), []).append(one)
         for rows in same.values():
             yield from (rows[at : at + together] for at in range(0, len(rows), together))
         yield from ([one] for one in asked if one.row.task in ("duet", "export") or one.timeline is not None)
@@ -247,23 +244,26 @@ class Maker:
     def _made(self, rows: list[Asked]) -> list[Made]:
         for one in rows:
             check_format(self.options.format, robot=one.robot is not None)
-        if rows[0].clip is not None:
-            return [self._export(rows[0], rows[0].clip)]
-        if rows[0].row.task == "duet":
-            return [self._duet(rows[0])]
-        if rows[0].row.task == "compose":
-            return [self._compose(rows[0])]
-        if rows[0].timeline is not None:
-            return [self._worded(rows[0], rows[0].timeline)]
-        if rows[0].row.task == "control":
+        first = rows[0]
+        if first.clip is not None:
+            return [self._export(first, first.clip)]
+        if first.row.task in ("control", "compose"):
+            self._only_ddpm(first)
+        if first.row.task == "control":
             return [
                 self._alone(one, made.motion, error=round(made.error, 4), worst=round(made.worst, 4))
                 for one, made in zip(rows, self._control(rows), strict=True)
             ]
+        if first.row.task == "duet":
+            return [self._duet(first)]
+        if first.timeline is not None:
+            [made] = run(self._plan(first), self.models)
+            kept = {} if made.about is None else {"keeps": all(one.kept for one in made.about.amounts)}
+            return [self._measured(first, made.people[0], **kept)]
         options = self.options
         drawn = draw_group(
             self.prior,
-            [one.row.prompt for one in rows],
+            [one.row.words for one in rows],
             [one.frames for one in rows],
             seeds=[self._best_seed(one) for one in rows],
             guidance=options.guidance,
@@ -275,15 +275,51 @@ class Maker:
             for one, features in zip(rows, drawn, strict=True)
         ]
 
+    def _plan(self, asked: Asked) -> Plan:
+        """What a row asks of its task."""
+        options, row, timeline = self.options, asked.row, asked.timeline
+        task = row.task or "generate"
+        goals = (None, asked.goal) if row.whom else (asked.goal, None)
+        said = {
+            "prompt": row.prompt,
+            "foot_lock": not options.raw,
+            "loop": options.loop is not None,
+            "blend": options.loop,
+            "person": row.whom,
+            "timeline": timeline,
+            "goals": asked.goal,
+        }
+        sampling: Any = self._sampling(asked, timeline and timeline.guidance)
+        if task == "duet":
+            sampling = PairSampling(**vars(sampling), pair_guidance=options.pair_guidance)
+        return Plan(
+            task=task,
+            values=make(REQUESTS[task], {name: value for name, value in said.items() if value is not None}),
+            sampling=sampling,
+            seconds=asked.frames / self.prior.fps,
+            timeline=timeline,
+            start=asked.start,
+            goals=goals,
+        )
+
     def _best_seed(self, asked: Asked) -> int:
         """The row's own seed, or the best of several; tried alone, so that it is the same whatever rows are beside."""
         if asked.best_of == 1:
             return asked.seed
-        options = self.options
-        rows = Rows([asked.row.prompt], [asked.frames], [asked.seed])
-        sampling = Sampling(steps=options.steps, guidance=options.guidance, solver=options.solver)
-        (seed,) = with_best_seeds(self.prior, rows, asked.best_of, sampling).seeds
+        rows = Rows([asked.row.words], [asked.frames], [asked.seed])
+        (seed,) = with_best_seeds(self.prior, rows, self._sampling(asked)).seeds
         return seed
+
+    def _sampling(self, asked: Asked, guidance: float | None = None) -> Sampling:
+        """How a row is sampled; guidance: of its timeline."""
+        options = self.options
+        return Sampling(
+            steps=options.steps,
+            guidance=options.guidance if guidance is None else guidance,
+            solver=options.solver,
+            seed=asked.seed,
+            best_of=asked.best_of,
+        )
 
     def _export(self, asked: Asked, clip: Path) -> Made:
         """A recording as it is, on the row's skeleton or robot."""
@@ -291,26 +327,17 @@ class Maker:
         person = motion if motion.skeleton == SMPL22 else to_smpl22(motion)
         return self._finished(asked, [motion], [measure(person, asked.text, self.judge)])
 
-    def _worded(self, asked: Asked, timeline: Timeline) -> Made:
-        """A prompt with numbers that are kept."""
-        options = self.options
-        sampling = Sampling(steps=options.steps, guidance=options.guidance, solver=options.solver, seed=asked.seed)
-        (made,) = draw(self.prior, [timeline], foot_lock=not options.raw, sampling=sampling)
-        return self._alone(asked, made.motion, keeps=all(one.kept for one in made.amounts))
-
     def _control(self, rows: list[Asked]) -> list[Controlled]:
         """As `motionloom.tasks.control.control`, for prompts and seeds that share a goal."""
         goal = rows[0].goal
         assert goal is not None
-        self._only_ddpm(rows[0])
         place = start_of(goal)
         drawn = steered_features(
             self.prior,
-            [one.row.prompt for one in rows],
+            [one.row.words for one in rows],
             goal.seen_from(place),
             seeds=[one.seed for one in rows],
-            guidance=self.options.guidance,
-            steps=self.options.steps,
+            sampling=self._sampling(rows[0]),
         )
         foot_lock = not self.options.raw
         placed = [
@@ -319,90 +346,28 @@ class Maker:
         ]
         return [judged(fit(motion, goal), motion, goal) for motion in placed]
 
-    def _compose(self, asked: Asked) -> Made:
-        timeline = asked.timeline
-        assert timeline is not None
-        self._only_ddpm(asked)
-        guidance = self.options.guidance if timeline.guidance is None else timeline.guidance
-        pieces = compose(
-            self.prior,
-            timeline.segments,
-            seed=asked.seed,
-            guidance=guidance,
-            steps=self.options.steps,
-            start=asked.start,
-            path=timeline.path,
-            foot_lock=not self.options.raw,
-        )
-        return self._alone(asked, joined(list(pieces)))
-
-    @cached_property
-    def _block(self) -> PairBlock:
-        return PairBlock.load(self.options.pair_weights, self.prior)
-
     def _duet(self, asked: Asked) -> Made:
         """Two people, one pair at a time: what is drawn beside it would change the last bits."""
-        texts = (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.prompt)
-        first, second = self._two(asked)
-        duet = self._looped(asked, first, ""), self._looped(asked, second, "")
+        texts = (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.words)
+        [made] = run(self._plan(asked), self.models)
+        duet = made.people[0], made.people[1]
         measured = measure_two(duet, texts, self.judge)
         if asked.goal is not None:
-            person = asked.row.person - 1
+            person = asked.row.whom
             missed = judged(duet[person], duet[person], asked.goal)
             measured[person] |= {"error": round(missed.error, 4), "worst": round(missed.worst, 4)}
         return self._finished(asked, duet, measured)
-
-    def _two(self, asked: Asked) -> Duet:
-        options, person = self.options, asked.row.person - 1
-        how = {
-            "guidance": options.guidance,
-            "steps": options.steps,
-            "solver": options.solver,
-            "seed": asked.seed,
-            "pair_guidance": options.pair_guidance,
-        }
-        if (timeline := asked.timeline) is not None:
-            how |= {} if timeline.guidance is None else {"guidance": timeline.guidance}
-            segments = with_loaded(self.prior, timeline.segments)
-            blocks = list(
-                compose_pair(
-                    self.prior,
-                    self._block,
-                    segments,
-                    path=timeline.path,
-                    person=person,
-                    foot_lock=not options.raw,
-                    **how,
-                )
-            )
-            return joined([block[0] for block in blocks]), joined([block[1] for block in blocks])
-        goals = (None, asked.goal) if person else (asked.goal, None)
-        (duet,) = generate_pair(
-            self.prior,
-            self._block,
-            asked.row.prompt,
-            seconds=asked.frames / self.prior.fps,
-            goals=goals,
-            foot_lock=not options.raw,
-            **how,
-        )
-        return duet
 
     def _only_ddpm(self, asked: Asked) -> None:
         if self.options.solver != SOLVER:
             raise MotionloomError(f"the task {asked.row.task} is made with the solver {SOLVER}")
 
-    def _looped(self, asked: Asked, motion: Motion, text: str) -> Motion:
-        """As ``motionloom generate --loop``: ``text`` is what is done at the end."""
-        if self.options.loop is None:
-            return motion
-        settings = Sampling(seed=asked.seed, steps=self.options.steps, guidance=self.options.guidance)
-        foot_lock = not self.options.raw
-        return edit(self.prior, motion, text, Loop(self.options.loop), foot_lock=foot_lock, sampling=settings)[0]
-
     def _alone(self, asked: Asked, motion: Motion, **measured: float) -> Made:
-        last = asked.row.prompt if asked.timeline is None else asked.timeline.segments[-1].text
-        motion = self._looped(asked, motion, last)
+        """A motion of a prompt, whose loop is not closed yet."""
+        made = closed(self._plan(asked), self.models, Result((motion,)))
+        return self._measured(asked, made.people[0], **measured)
+
+    def _measured(self, asked: Asked, motion: Motion, **measured: float) -> Made:
         return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])
 
     def _finished(self, asked: Asked, people: Sequence[Motion], measured: Sequence[Values]) -> Made:
@@ -413,7 +378,7 @@ class Maker:
             measured = [{**own, **figures} for own, (_, figures, _) in zip(measured, found, strict=True)]
             return Made(tuple(one for one, _, _ in found), tuple(measured), tuple(save for _, _, save in found))
         if asked.target is not None:
-            people = [retarget(motion, asked.target) for motion in people]
+            people = [retarget(motion, asked.target, root=self.options.root) for motion in people]
         people = [pose_hands(motion, self.options.hands) for motion in people]
         if self.options.fps is not None:
             people = [motion.resample(self.options.fps) for motion in people]

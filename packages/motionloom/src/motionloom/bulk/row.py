@@ -38,31 +38,19 @@ _KEPT = 64
 """Files named by rows, and as many prompts and goals, that are kept in memory."""
 
 
-@dataclass(frozen=True)
-class Row:
+@dataclass(frozen=True, kw_only=True)
+class Row(RowKeys):
     """One row of a job as it is written, checked by itself; the files it names are not yet read."""
 
-    task: str
-    prompt: str
-    """Empty where there is a timeline, which says what happens."""
-    seconds: float | None
-    seed: int | None
-    timeline: str | None = None
-    goal: str | dict[str, Any] | None = None
-    person: int = 1
-    """Whose the goal is, or a timeline's path and goals: of two people the first (1) or the second (2)."""
-    skeleton: str | None = None
-    best_of: int | None = None
-    """Seeds that are tried for the motion of a prompt; None: as the job says."""
-    motion: str | None = None
-    """A file with a recording, which is put on a skeleton or a robot."""
-    robot: str | None = None
-    """A robot's model that the motion is put on, and how; what is None is as the job says."""
-    robot_map: str | None = None
-    max_speed: float | None = None
-    avoid_collisions: bool | None = None
-    name: str | None = None
-    """The user's own ``id``: the name of the motion's files."""
+    @property
+    def words(self) -> str:
+        """The prompt; empty where there is a timeline, which says what happens."""
+        return self.prompt or ""
+
+    @property
+    def whom(self) -> int:
+        """Whose the goal is, or a timeline's path and goals: of two people the first (0) or the second (1)."""
+        return (self.person or 1) - 1
 
     @property
     def names_files(self) -> bool:
@@ -95,13 +83,13 @@ class Asked:
     @property
     def id(self) -> str:
         """The row's own id, else the key: how the motion's files are called."""
-        return self.row.name or self.key
+        return self.row.id or self.key
 
     @property
     def text(self) -> str:
         """What the motion shows, in words."""
         if self.timeline is None or self.row.prompt:
-            return self.row.prompt or self.row.motion or ""
+            return self.row.words or self.row.motion or ""
         return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_PROMPT]
 
 
@@ -134,7 +122,7 @@ def _parsed(raw: bytes) -> Row:
         )
     if type(row.get("id")) is int:
         row["id"] = str(row["id"])
-    keys = read(RowKeys, row, "the row")
+    keys = read(Row, row, "the row")
     task = _task(keys.task, goal is not None, keys.timeline is not None, keys.motion is not None)
     if keys.timeline is None and keys.prompt is None and keys.motion is None:
         raise MotionloomError("the row has no prompt; say in words what the person does")
@@ -147,22 +135,11 @@ def _parsed(raw: bytes) -> Row:
         )
     if keys.person is not None and (task != "duet" or (goal is None and keys.timeline is None)):
         raise MotionloomError("'person' says whose a goal or a timeline's path is, in rows of the task duet")
-    if keys.motion is not None and (keys.seconds, keys.seed) != (None, None):
-        raise MotionloomError("a row with a motion draws nothing; leave out its seconds and its seed")
+    if keys.motion is not None and (keys.seconds, keys.seed, keys.best_of) != (None, None, None):
+        raise MotionloomError("a row with a motion draws nothing; leave out its seconds, seed and best_of")
     if keys.skeleton is not None and (keys.robot, keys.max_speed, keys.avoid_collisions) != (None, None, None):
         raise MotionloomError("the row has a skeleton, and columns of a robot; leave one of them out")
-    if keys.best_of is not None and task != "generate":
-        raise MotionloomError(f"'best_of' chooses among motions of a prompt; the row asks for {task}")
-    same = ("seconds", "seed", "timeline", "skeleton", "best_of", "motion", "robot", "robot_map", "max_speed")
-    return Row(
-        task,
-        keys.prompt or "",
-        goal=goal,
-        person=keys.person or 1,
-        avoid_collisions=keys.avoid_collisions,
-        name=keys.id,
-        **{name: getattr(keys, name) for name in same},
-    )
+    return replace(keys, task=task, goal=goal)
 
 
 def _columns(raw: bytes) -> dict[str, Any]:
@@ -267,7 +244,7 @@ class Sources:
         if row.timeline is not None:
             timeline = self._read("timeline", row.timeline, lambda path: read_timeline(path, metre), metre)
             start = None if timeline.start is None else self._kept("start", timeline.start, load)
-            _check_timeline(row.task, timeline)
+            _check_timeline(row.task or "", timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
             frames, digest = timeline.frames, digest_timeline(timeline, start)
         elif row.motion is not None:
@@ -285,7 +262,7 @@ class Sources:
         said = {
             "common": self._common,
             "task": row.task,
-            "prompt": row.prompt,
+            "prompt": row.words,
             "frames": frames,
             "seed": seed,
             "goal": goal[1],
@@ -294,29 +271,24 @@ class Sources:
         }
         said |= {} if clip is None else {"motion": hash_file(clip)}  # left out as they always were: old ids hold
         said |= {} if robot is None else {"robot": robot.determined()}
-        best_of = self._best_of(row) if timeline is None else 1
+        best_of = 1 if clip is not None else self.best_of if row.best_of is None else row.best_of
         if best_of > 1:
             said["best_of"] = best_of
         if row.task == "duet":
-            said |= {"pair": self._pair, "person": row.person}
+            said |= {"pair": self._pair, "person": row.whom + 1}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of, clip, robot)
-
-    def _best_of(self, row: Row) -> int:
-        if row.task != "generate":
-            return 1
-        return self.best_of if row.best_of is None else row.best_of
 
     def _worded(self, row: Row, metre: float) -> tuple[Timeline | None, str | None]:
         """The row's prompt as a timeline, where numbers in it are kept, and its hash.
 
         It is as long as the numbers need where no time is said. Many rows have the same words: they are read once.
         """
-        if row.task != "generate" or self.literal or self.fps != FPS or not row.prompt.strip():
+        if row.task != "generate" or self.literal or self.fps != FPS or not row.words.strip():
             return None, None
         if row.seconds is not None and not SHORTEST <= row.seconds <= LONGEST:
             return None, None
-        words = (row.prompt, row.seconds, metre)
+        words = (row.words, row.seconds, metre)
         return self._written.get(words, lambda: _timeline_in(*words))
 
     def _goal(self, goal: str | dict[str, Any], frames: int, metre: float) -> tuple[Goal, str]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from motionloom.diffusion import SOLVERS, guide, levels, row_noise, run
-from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, check, smooth
+from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, check
 from motionloom.weights.prior import Prior
 
 
@@ -51,5 +51,4 @@ def draw_group(
         noise=noise,
     )
     finished = state * prior.std + prior.mean
-    rows = [finished[row, : frames[row]] for row in range(len(prompts))]
-    return [smooth(row) for row in rows] if prior.net.config.patch > 1 else rows
+    return [prior.smoothed(finished[row, : frames[row]]) for row in range(len(prompts))]

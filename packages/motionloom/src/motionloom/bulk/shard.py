@@ -197,8 +197,8 @@ class _Shard:
                 continue
             if one.id in seen:
                 before = self.task.first + seen[one.id]
-                why = f"row {before} of the job is the same" if one.row.name is None else f"row {before} has this id"
-                state = "repeated" if one.row.name is None else "failed"
+                why = f"row {before} of the job is the same" if one.row.id is None else f"row {before} has this id"
+                state = "repeated" if one.row.id is None else "failed"
                 self.refused += state == "failed"
                 self.entries[number] = self._entry(number, state, one, error=why)
                 continue

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import add_adapters, fail
-from motionloom.cli.skeletons import HANDS
+from motionloom.cli.skeletons import HANDS, ROOTS
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.requests.batch import Batch
 
@@ -63,6 +63,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
     add_options(parser, Batch)
     parser.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motions on this skeleton")
+    parser.add_argument("--root", choices=ROOTS, help="what carries the way on a skeleton with a root bone")
     parser.add_argument("--hands", choices=HANDS, default="as-is", help="pose of the hands, on skeletons with fingers")
     parser.add_argument(
         "--out-unit", type=as_unit, default=1.0, metavar="UNIT", help="unit of --format bvh: m (default), cm, inch ..."
@@ -155,38 +156,21 @@ def _jobs(arguments: argparse.Namespace) -> "Jobs":
 
 
 def _options(arguments: argparse.Namespace) -> "Options":
+    from dataclasses import fields
+
     from motionloom.bulk.maker import Options
     from motionloom.bulk.measures import Filter
 
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     if obeys:
         import_module(JUDGE.partition(":")[0])  # before any work: without the laboratory nobody judges
+    named = {one.name for one in fields(Options)} - {"loop"}
     return Options(
-        weights=arguments.weights,
+        **{name: value for name, value in vars(arguments).items() if name in named},
         adapters=arguments.adapter,
-        device=arguments.device,
         raw=not arguments.foot_lock,
         loop=arguments.blend if arguments.loop else None,
-        steps=arguments.steps,
-        guidance=arguments.guidance,
-        solver=arguments.solver,
-        fps=arguments.fps,
-        pair_weights=arguments.pair_weights,
-        pair_guidance=arguments.pair_guidance,
-        shard_rows=arguments.shard_rows,
-        hands=arguments.hands,
         unit=arguments.out_unit,
-        seconds=arguments.seconds,
-        literal=arguments.literal,
-        best_of=arguments.best_of,
-        seed=arguments.seed,
-        skeleton=arguments.skeleton,
-        robot=arguments.robot,
-        robot_map=arguments.robot_map,
-        max_speed=arguments.max_speed,
-        avoid_collisions=arguments.avoid_collisions,
-        format=arguments.format,
-        filter=arguments.filter,
         judge=JUDGE if obeys else None,
     )
 

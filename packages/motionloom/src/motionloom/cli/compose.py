@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.looping import check_loop, looped
 from motionloom.cli.options import add_options
 from motionloom.cli.robots import metres_told
-from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
+from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, remark_unknown, sampling_of
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
 from motionloom.requests.compose import Compose
@@ -40,7 +40,7 @@ def add(subparsers) -> None:
     )
     add_options(parser, SegmentKeys, "seconds", "transition", helps={"seconds": "length of each segment, with prompts"})
     parser.set_defaults(seconds=None)
-    add_options(parser, Compose, "seed", "guidance", "steps", *FINISH)
+    add_options(parser, Compose, "seed", "guidance", "steps", "best_of", *FINISH)
     add_sampling(parser)
     parser.add_argument("--check", action="store_true", help="only say what would be made")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of timeline files")
@@ -71,9 +71,10 @@ def _compose(arguments: argparse.Namespace) -> int:
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
     timeline = replace(timeline, segments=with_loaded(prior, timeline.segments))
     streams = _open(arguments, outs, timeline, target)
-    interrupted = _make(arguments, prior, timeline, streams)
+    shown: list[Motion] = []
+    interrupted = _make(arguments, prior, timeline, streams, shown)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
-    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks)
+    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks, happened=_happened(shown))
     if interrupted:
         print(f"motionloom: interrupted; {_kept(streams)} of {timeline.seconds:.2f} s", file=sys.stderr)
         return 130
@@ -113,8 +114,28 @@ def _open(
     return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
 
 
-def _make(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline", streams: Sequence["Stream"]) -> bool:
-    """Write the motion; true if it was interrupted after something was finished."""
+def _happened(pieces: "Sequence[Motion]") -> list[Any]:
+    """What the person of these pieces did, if there are any."""
+    from motionloom.kinematics.deeds import happened
+    from motionloom.tasks.splice import concatenated
+
+    return happened([concatenated(*pieces)] if pieces else [])
+
+
+def _make(
+    arguments: argparse.Namespace,
+    prior: "Prior",
+    timeline: "Timeline",
+    streams: Sequence["Stream"],
+    shown: "list[Motion]",
+) -> bool:
+    """Write the motion; true if it was interrupted after something was finished.
+
+    ``shown`` gets its pieces where what happened is told: of a motion that is not too long for that.
+    """
+    from motionloom.kinematics.deeds import LONGEST
+
+    told = arguments.json and timeline.seconds <= LONGEST
     from contextlib import closing
 
     from motionloom.errors import MotionloomError
@@ -122,7 +143,7 @@ def _make(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline", s
 
     try:
         with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is said
-            _write(pieces, streams, arguments.fps)
+            _write(_kept_in(shown, pieces) if told else pieces, streams, arguments.fps)
     except KeyboardInterrupt:
         with held_back():  # it may have come just before they were closed
             for stream in streams:
@@ -137,6 +158,12 @@ def _make(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline", s
     if not _saved(streams):
         fail("no motion was made; this is a fault of the program")
     return False
+
+
+def _kept_in(shown: "list[Motion]", pieces: Iterable["Motion"]) -> Generator["Motion", None, None]:
+    for piece in pieces:
+        yield piece
+        shown.append(piece)
 
 
 def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float | None) -> None:
@@ -157,6 +184,7 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
 def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:
     from motionloom.cli.reading import load_motion
     from motionloom.tasks import long
+    from motionloom.tasks.run import moves
 
     start = None if timeline.start is None else load_motion(arguments, timeline.start)
     named = {"guidance": timeline.guidance, "seed": timeline.seed}
@@ -195,6 +223,7 @@ def _report(
     seconds: float,
     streams: Sequence["Stream"],
     remarks: Sequence[str] = (),
+    happened: Sequence[Any] = (),
 ) -> None:
     """Print what was made and where each segment lies in it, as far as it was made."""
     begins = [frame / 20 for frame in timeline.begins]
@@ -208,7 +237,7 @@ def _report(
 
         files = [str(stream.path) for stream in streams]
         about = {"seconds": seconds, "of": timeline.seconds, "files": files, "segments": rows}
-        about |= {"remarks": list(remarks)}
+        about |= {"remarks": list(remarks), "happened": list(happened)}
         print(json.dumps(about, indent=1))
         return
     for stream in streams:

@@ -5,13 +5,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.finished import finished_motions, groups
-from motionloom.cli.looping import check_loop, looped, note_loop
+from motionloom.cli.finished import Finished, finished_motions
+from motionloom.cli.looping import check_loop, note_loop
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.options import add_options
 from motionloom.cli.sampling import (
     add_sampling,
-    bar,
     check_outs,
     check_prompt,
     fail,
@@ -19,7 +18,8 @@ from motionloom.cli.sampling import (
     places,
     remark_unknown,
     report,
-    sampling_of,
+    request_of,
+    results,
 )
 from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
@@ -86,6 +86,8 @@ def run_control(arguments: argparse.Namespace) -> int:
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return 0
+    from motionloom.tasks.run import Models, Plan
+
     outs, target = check_outs(arguments)
     if len(one_sentence(arguments.prompt)) > 1:
         fail(f"one prompt is needed; got {len(arguments.prompt)}: {', '.join(arguments.prompt)[:200]}")
@@ -109,10 +111,23 @@ def run_control(arguments: argparse.Namespace) -> int:
     made = finished_motions(
         files, [arguments.prompt] * arguments.count, target, unit=arguments.out_unit, rate=arguments.fps
     )
-    judged: list[Controlled] = []
-    interrupted = made.take(_made(arguments, prior, goal, judged))
+    values, judged = request_of(arguments, Control, {"goals": goal}), []
+    plan = Plan(
+        task="control",
+        values=values,
+        sampling=values.sampling,
+        goals=(goal, None),
+        adapters=_adapters(arguments.adapters, prior),
+    )
+
+    def drawn() -> "Iterator[list[Motion]]":
+        for one in results("controlling", plan, Models(prior)):
+            judged.append(one.about)
+            yield list(one.people)
+
+    interrupted = made.take(drawn(), told=arguments.json)
     written = [[file for file in several if file in made.written] for several in files]
-    _report(arguments, judged[: made.count], written, metre=metre, seconds=made.sampling, remarks=remarks)
+    _report(arguments, judged[: made.count], written, made=made, metre=metre, remarks=remarks)
     return made.ended(interrupted)
 
 
@@ -178,33 +193,6 @@ def _drawn(path: Path, width: float | None, frames: int, metre: float) -> "Goal"
     return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent, metre=metre)
 
 
-def _made(
-    arguments: argparse.Namespace, prior: "Prior", goal: "Goal", judged: "list[Controlled]"
-) -> "Iterator[list[Motion]]":
-    """The motions, as many at once as the network sees; ``judged`` gets them too, with how near they came."""
-    from motionloom.requests.sampling import BATCH
-    from motionloom.tasks.control import control
-
-    adapters = _adapters(arguments.adapters, prior)
-    with bar("controlling") as progress:
-        for some, moved in groups(arguments.count, BATCH, progress):
-            made = control(
-                prior,
-                arguments.prompt,
-                goal,
-                adapters=adapters,
-                fit=arguments.fit,
-                foot_lock=arguments.foot_lock,
-                progress=moved,
-                **sampling_of(arguments) | some,
-            )
-            judged += made
-            yield [
-                looped(arguments, prior, one.motion, arguments.prompt, seed=arguments.seed + some["first"] + number)
-                for number, one in enumerate(made)
-            ]
-
-
 def _adapters(names: list[str], prior: "Prior") -> "Adapters":
     """'none', 'fitting' or the adapters of these names."""
     if not names or names == ["none"]:
@@ -220,15 +208,15 @@ def _adapters(names: list[str], prior: "Prior") -> "Adapters":
 
 def _report(
     arguments: argparse.Namespace,
-    made: "list[Controlled]",
+    judged: "list[Controlled]",
     written: list[list[Path]],
     *,
+    made: "Finished[Motion]",
     metre: float,
-    seconds: float,
     remarks: list[str],
 ) -> None:
-    for number, one in enumerate(made):
-        which = f"motion {number} (seed {arguments.seed + number}): " if len(made) > 1 else ""
+    for number, one in enumerate(judged):
+        which = f"motion {number} (seed {arguments.seed + number}): " if len(judged) > 1 else ""
         for sentence in one.missed:
             print(f"motionloom: {which}{sentence}", file=sys.stderr)
     if arguments.json:
@@ -239,19 +227,20 @@ def _report(
                 "error_cm": round(100 * metre * one.error, 3),
                 "worst_cm": round(100 * metre * one.worst, 3),
                 "missed": one.missed,
+                "happened": made.happened[number],
             }
-            for number, one in enumerate(made)
+            for number, one in enumerate(judged)
         ]
         about = {
             "motions": motions,
-            "seconds": len(made[0].motion) / made[0].motion.fps,
+            "seconds": len(judged[0].motion) / judged[0].motion.fps,
             "weights": str(arguments.weights),
             "remarks": remarks,
         }
-        report(arguments, about, [path for several in written for path in several], seconds)
+        report(arguments, about, [path for several in written for path in several], made.sampling)
         return
     for several in written:
         for number, path in enumerate(several):
-            of = made if len(several) == 1 else [made[number]]
+            of = judged if len(several) == 1 else [judged[number]]
             mean, worst = sum(one.error for one in of) / len(of), max(one.worst for one in of)
             print(f"wrote {path}: {100 * metre * mean:.1f} cm from its goals, at most {100 * metre * worst:.1f} cm")

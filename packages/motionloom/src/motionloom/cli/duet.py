@@ -5,21 +5,19 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from motionloom.cli.finished import Finished, groups
-from motionloom.cli.looping import looped
+from motionloom.cli.finished import Finished
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.robots import metres_told
 from motionloom.cli.sampling import (
     add_sampling,
-    bar,
     check_prompt,
     fail,
     load_prior,
-    moves,
     places,
     report,
-    sampling_of,
+    request_of,
+    results,
     take_text_anywhere,
 )
 from motionloom.cli.skeletons import CHARACTERS, Target, own_outs, read_target
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
     from motionloom.goals.timeline import Timeline
     from motionloom.motion import Motion
+    from motionloom.tasks.run import Plan
     from motionloom.weights.pair import PairBlock
     from motionloom.weights.prior import Prior
 
@@ -42,8 +41,6 @@ MAX_SECONDS = 3600.0
 """Of a timeline."""
 SECONDS, ADDED = 6.0, 3.0
 """Length of a duet, and what is added to a past, unless asked otherwise."""
-PAIRS = 8
-"""Duets that are drawn together: those of a group that is finished stay where the next one is interrupted."""
 SINGLE = writable(single=True)
 """Files of one person each."""
 REMARKED = 64
@@ -94,6 +91,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def run_duet(arguments: argparse.Namespace) -> int:
     """``motionloom duet``."""
+    from motionloom.tasks.run import Models
+
     _check(arguments)
     outs, skin = check_pair_outs(arguments)
     files = places(outs, arguments.count, sheets=False, target=skin)
@@ -122,24 +121,17 @@ def run_duet(arguments: argparse.Namespace) -> int:
 
     def drawn() -> "Iterator[list[list[Motion]]]":
         nonlocal seconds
-        with bar("drawing two people") as progress:
-            for some, moved in groups(arguments.count, PAIRS, progress):
-                duets = _make(
-                    arguments, prior, block, given=given, timeline=timeline, goals=goals, progress=moved, some=some
-                )
-                seconds = duets[0][0].seconds
-                seed = (arguments.seed or 0) + some["first"]
-                duets = [
-                    [looped(arguments, prior, person, "", seed=seed + number) for person in duet]
-                    for number, duet in enumerate(duets)
-                ]
-                measures.extend(two_body_measures(duet) for duet in duets)
-                yield duets
+        plan = _plan(arguments, given, timeline, goals)
+        for one in results("drawing two people", plan, Models(prior, block)):
+            seconds = one.people[0].seconds
+            measures.append(two_body_measures(one.people))
+            yield [list(one.people)]
 
-    interrupted = made.take(drawn())
+    interrupted = made.take(drawn(), told=arguments.json)
     about = _about(arguments, made.count, seconds)
     about |= {
         "measures": measures[: made.count],
+        "happened": made.happened,
         "remarks": remarks + _printed(two_body_remarks(measures[: made.count])),
     }
     report(arguments, about, made.written, made.sampling)
@@ -147,63 +139,27 @@ def run_duet(arguments: argparse.Namespace) -> int:
     return made.ended(interrupted)
 
 
-def _make(
+def _plan(
     arguments: argparse.Namespace,
-    prior: "Prior",
-    block: "PairBlock",
-    *,
     given: "list[Motion]",
     timeline: "Timeline | None",
     goals: "tuple[Goal | None, Goal | None]",
-    progress: Any,
-    some: dict[str, int],
-) -> "list[list[Motion]]":
-    """Some of the duets, of which ``some`` says which."""
-    from motionloom.tasks import duet, pair
+) -> "Plan":
+    """What is asked, with what was read."""
+    from motionloom.requests.reading import settled
+    from motionloom.tasks.run import Plan
 
-    text: str = arguments.text or ""
-    shared: dict[str, Any] = {"foot_lock": arguments.foot_lock, **sampling_of(arguments)}
-    if timeline is not None:
-        return [_composed(arguments, prior, block, timeline, progress, shared)]
-    shared |= {**some, "progress": progress}
-    if arguments.past:
-        added = ADDED if arguments.seconds is None else arguments.seconds
-        made = pair.complete_pair(prior, block, (given[0], given[1]), text, seconds=added, **shared)
-    elif arguments.react_to:
-        made = duet.react(prior, block, given[0], text, **shared)
-    else:
-        length = SECONDS if arguments.seconds is None else arguments.seconds
-        made = pair.generate_pair(prior, block, text, seconds=length, goals=goals, **shared)
-    return [list(one) for one in made]
-
-
-def _composed(
-    arguments: argparse.Namespace,
-    prior: "Prior",
-    block: "PairBlock",
-    timeline: "Timeline",
-    progress: Any,
-    shared: dict[str, Any],
-) -> "list[Motion]":
-    from motionloom.tasks.duet import compose_pair
-    from motionloom.tasks.long import with_loaded
-    from motionloom.tasks.splice import concatenated
-
-    named = {"guidance": timeline.guidance, "seed": timeline.seed}
-    shared = {name: value for name, value in named.items() if value is not None} | shared
-    segments = with_loaded(prior, timeline.segments)
-    blocks = list(
-        compose_pair(
-            prior,
-            block,
-            segments,
-            path=timeline.path,
-            person=arguments.person - 1,
-            progress=moves(progress, arguments.steps, len(segments)),
-            **shared,
-        )
+    values = request_of(arguments, Duet, {"prompt": arguments.text, "person": arguments.person - 1})
+    usual = ADDED if arguments.past else SECONDS
+    return Plan(
+        task="duet",
+        values=values,
+        sampling=settled(values, timeline),
+        seconds=usual if arguments.seconds is None else arguments.seconds,
+        timeline=timeline,
+        goals=goals,
+        people=tuple(given),
     )
-    return [concatenated(*[one[i] for one in blocks]) for i in (0, 1)]
 
 
 # What is read

@@ -2,21 +2,21 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from motionloom.cli.finished import Finished, groups
+from motionloom.cli.finished import Finished
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_sampling,
-    bar,
     check_outs,
     check_prompt,
     load_prior,
     places,
     remark_unknown,
     report,
-    sampling_of,
+    request_of,
+    results,
     take_text_anywhere,
     write,
 )
@@ -27,10 +27,9 @@ from motionloom.requests.edit import Edit
 from motionloom.requests.shared import FINISH, SAMPLED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from motionloom.motion import Motion
-    from motionloom.weights.prior import Prior
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -52,6 +51,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def run_edit(arguments: argparse.Namespace) -> int:
     """``motionloom edit CLIP TEXT``."""
+
+    from motionloom.retarget import to_smpl22
+    from motionloom.tasks.run import Models, Plan
+
     uniform = arguments.skeleton in ("smpl", "smpl22")  # made so, rather than put on it afterwards
     arguments.skeleton = None if uniform or arguments.skeleton == "own" else arguments.skeleton
     outs, target = check_outs(arguments)
@@ -70,50 +73,26 @@ def run_edit(arguments: argparse.Namespace) -> int:
         files,
         arguments.count,
         _writer(captions, target, arguments.out_unit or unit, orders),
-        put=lambda motions: put_all(target, motions),
+        put=lambda motions: put_all(target, at_rate(motions, arguments.fps)),
     )
-    interrupted = made.take(_made(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own"))
+    keep = [name.strip() for part in arguments.keep for name in part.split(",")]
+    values = request_of(arguments, Edit, {"motion": clip, "prompt": arguments.text, "keep": keep})
+    clip = crop(clip, arguments)
+    people = (to_smpl22(clip) if uniform else clip,)
+    plan = Plan(task="edit", values=values, sampling=values.sampling, people=people)
+    versions = results("editing", plan, Models(prior))
+    interrupted = made.take((list(one.people) for one in versions), told=arguments.json)
     about = {
         "clip": str(arguments.clip),
         "prompt": arguments.text,
         "seeds": [arguments.seed + i for i in range(made.count)],
         "weights": str(arguments.weights),
         "remarks": remarks,
+        "happened": made.happened,
     }
     report(arguments, about, made.written, made.sampling)
     note_rate(arguments, [arguments.clip])
     return made.ended(interrupted)
-
-
-def _made(
-    arguments: argparse.Namespace, prior: "Prior", clip: "Motion", skeleton: "Literal['own', 'smpl']"
-) -> "Iterator[list[Motion]]":
-    """The versions, one after the other."""
-    from motionloom.tasks.edit import changes_asked, edit
-
-    text = arguments.text or ""
-    changes = changes_asked(
-        text,
-        keep=[name.strip() for part in arguments.keep for name in part.split(",")],
-        loop=arguments.loop,
-        between=arguments.between,
-        blend=arguments.blend,
-        extend=arguments.extend,
-        strength=arguments.strength,
-    )
-    with bar("editing") as progress:
-        for some, moved in groups(arguments.count, 1, progress):
-            motions = edit(
-                prior,
-                clip,
-                text,
-                changes,
-                skeleton=skeleton,
-                foot_lock=arguments.foot_lock,
-                progress=moved,
-                **sampling_of(arguments) | some,
-            )
-            yield at_rate(motions, arguments.fps)
 
 
 def _writer(

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -19,29 +19,6 @@ Made = TypeVar("Made")
 """What is made ``--count`` times: a motion, or the motions of two people."""
 Write = Callable[[Sequence[Made], list[list[Path]], int], object]
 """(what comes next, its files for each ``--out``, the number of its first): write it."""
-
-
-def groups(count: int, size: int, progress: Callable[[int, int], None]) -> Iterator[tuple[dict[str, Any], "Moved"]]:
-    """Numbers of what is made together: ``first`` and ``count`` of each group, and what moves the bar of all of them.
-
-    count: how many in all; size: how many at once, at most.
-    """
-    for first in range(0, count, size):
-        some = min(size, count - first)
-        yield {"first": first, "count": some}, Moved(progress, first, some, count)
-
-
-@dataclass(frozen=True)
-class Moved:
-    """Moves the bar of the whole by how far a group is: (calls done, calls in all)."""
-
-    progress: Callable[[int, int], None]
-    first: int
-    some: int
-    count: int
-
-    def __call__(self, done: int, total: int) -> None:
-        self.progress(self.first * total + self.some * done, self.count * total)
 
 
 @dataclass(eq=False)
@@ -61,6 +38,8 @@ class Finished(Generic[Made]):
     """How many are finished."""
     sampling: float = 0.0
     """Seconds of drawing."""
+    happened: list[list[dict[str, Any] | None]] = field(default_factory=list)
+    """What each person of each one did (`motionloom.kinematics.deeds`), where that is told."""
     _files: dict[Path, None] = field(default_factory=dict)
     _shown: list[Made] = field(default_factory=list)
 
@@ -69,13 +48,20 @@ class Finished(Generic[Made]):
         """Files that are in their places, by ``--out``."""
         return [file for several in self.files for file in several if file in self._files]
 
-    def take(self, makers: Iterable[Sequence[Made]]) -> bool:
-        """Write what ``makers`` give, in order, as it comes; true if that was interrupted after some was finished."""
+    def take(self, makers: Iterable[Sequence[Made]], *, told: bool = False) -> bool:
+        """Write what ``makers`` give, in order, as it comes; true if that was interrupted after some was finished.
+
+        told: measure what happened.
+        """
+        from motionloom.kinematics.deeds import happened
+
         try:
             began = time.perf_counter()
             for some in makers:
                 self.sampling += time.perf_counter() - began
                 self._add(some)
+                people: list[Any] = [one if isinstance(one, list) else [one] for one in some]
+                self.happened += map(happened, people) if told else ()
                 began = time.perf_counter()
         except KeyboardInterrupt:
             if not self.count:

@@ -77,7 +77,7 @@ def _generate(arguments: argparse.Namespace) -> int:
         for number, motion in enumerate(_drawn(arguments, prior, asked, worded, unknown=remarks))
     )
     seated: list[list[Seat]] = []
-    interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
+    interrupted = made.take(([motion] for motion in _noting(seated, drawn, target)), told=arguments.json)
     motions = [
         {
             "prompt": caption,
@@ -91,6 +91,8 @@ def _generate(arguments: argparse.Namespace) -> int:
         for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
     ]
     _remark_seats(seated[: made.count])
+    for motion, did in zip(motions, made.happened):
+        motion["happened"] = did
     for number, motion in enumerate(motions, start=1):
         if under := motion["stairs"]:
             whose = f"motion {number} " if len(motions) > 1 else ""
@@ -172,15 +174,11 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str, metre:
         metre=metre,
     )
     if said := numbers_read(found):
-        if arguments.best_of > 1 and len(found.segments) == 1:
-            print("motionloom: --best-of is not for numbers that are kept; this is drawn as it comes", file=sys.stderr)
         print(f"motionloom: {said}; --literal leaves numbers to the network", file=sys.stderr)
     if said := parts_read(found):
         if arguments.solver != SOLVER:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
         print(f"motionloom: {said}; --as-one leaves the sentence whole", file=sys.stderr)
-        if arguments.best_of > 1:
-            print("motionloom: --best-of is for one action; these are drawn as they come", file=sys.stderr)
     return found
 
 
@@ -242,7 +240,6 @@ def _drawn(
             prior,
             asked,
             foot_lock=arguments.foot_lock,
-            best_of=arguments.best_of,
             sampling=sampling,
             progress=progress,
         )

@@ -65,6 +65,7 @@ def add(subparsers) -> None:
 
 
 def _live(arguments: argparse.Namespace) -> int:
+    from motionloom.kinematics.deeds import happened
     from motionloom.live.commands import scaled
     from motionloom.live.live import motion_of
     from motionloom.live.script import read_script
@@ -95,7 +96,8 @@ def _live(arguments: argparse.Namespace) -> int:
     motions = [looped(arguments, prior, one, said, seed=seed) for one, said in zip(motions, words[-1], strict=True)]
     write = _write if script.people == 1 else _write_pair
     written = write(motions, words, outs, target, arguments.out_unit)
-    _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames)})
+    did = happened(motions) if arguments.json else []
+    _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames), "happened": did})
     return 0
 
 

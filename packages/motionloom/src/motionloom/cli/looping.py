@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from motionloom.cli.sampling import fail, sampling_of
@@ -55,18 +54,3 @@ def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text
     settings = {name: value for name, value in sampling_of(arguments).items() if name in names}
     settings |= {"blend": arguments.blend, "foot_lock": getattr(arguments, "foot_lock", True)}
     return close(prior, motion, text, seed=seed, **settings)
-
-
-def all_looped(arguments: argparse.Namespace, drawn: "Iterator[list[Motion]]") -> "Iterator[list[Motion]]":
-    """The motions as `looped` makes them with the prior of ``--loop-weights``, which is loaded before any is drawn."""
-    if not arguments.loop:
-        yield from drawn
-        return
-    from motionloom.tasks.edit import close
-    from motionloom.weights.prior import Prior
-
-    prior = Prior.load(arguments.loop_weights, device=arguments.device)
-    seed, how = arguments.seed, {"blend": arguments.blend, "foot_lock": arguments.foot_lock}
-    for motions in drawn:
-        yield [close(prior, motion, "", seed=seed + number, **how) for number, motion in enumerate(motions)]
-        seed += len(motions)

@@ -6,13 +6,13 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.finished import Finished, groups
+from motionloom.cli.finished import Finished
 from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_futures
 from motionloom.cli.futures import Target as Files
-from motionloom.cli.looping import all_looped, check_loop_behind
+from motionloom.cli.looping import check_loop_behind
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, load_motion, note_rate, read_clip
-from motionloom.cli.sampling import add_sampling, bar, fail, sampling_of
+from motionloom.cli.sampling import add_sampling, bar, fail, request_of, results, sampling_of
 from motionloom.cli.skeletons import Target, read_target
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import readable
@@ -23,6 +23,7 @@ from motionloom.requests.shared import FINISH
 if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints
     from motionloom.motion import Motion
+    from motionloom.tasks.run import Plan
     from motionloom.weights.predictor import Predictor
 
 LONG = 30.0
@@ -30,8 +31,6 @@ LONG = 30.0
 OPTIONS = (*NAMES, *FINISH)
 LISTED = 40
 """Files named at the end; --json lists all."""
-TOGETHER = 16
-"""Futures that are drawn together: those of a group that is finished stay where the next one is interrupted."""
 SAME_BONE = 1e-4
 """Metres by which bones of one skeleton may differ from file to file: numbers are rounded when they are written."""
 
@@ -115,6 +114,8 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str, *, out: str | Non
 
 def run_predict(arguments: argparse.Namespace) -> int:
     """``motionloom predict PAST``."""
+    from motionloom.tasks.run import Plan
+
     check_rate(arguments)
     if arguments.loop and arguments.seconds > LONG:
         fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
@@ -141,35 +142,27 @@ def run_predict(arguments: argparse.Namespace) -> int:
         given, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
         long = Long(wanted, writing, given, frames, _caption(arguments))
         return _predict_long(arguments, predictor, past, hold=hold, long=long)
-    from motionloom.tasks.predict import predict
-
-    def drawn() -> "Iterator[list[Motion]]":
-        with bar("predicting") as progress:
-            for some, moved in groups(arguments.count, TOGETHER, progress):
-                yield predict(
-                    predictor,
-                    past,
-                    seconds=arguments.seconds,
-                    hold=hold,
-                    root=not arguments.no_root,
-                    foot_lock=arguments.foot_lock,
-                    progress=moved,
-                    **sampling_of(arguments) | some,
-                )
-
-    return _written(arguments, drawn(), wanted, writing, past, note=lambda: _note_seen(predictor, past))
+    values = request_of(arguments, Predict, {"motion": past, "root": not arguments.no_root})
+    plan = Plan(task="predict", values=values, sampling=values.sampling, people=(past,), hold=hold)
+    note = lambda: _note_seen(predictor, past)  # noqa: E731
+    return _written(arguments, plan, predictor, wanted, writing, note=note)
 
 
 def _written(
     arguments: argparse.Namespace,
-    drawn: "Iterator[list[Motion]]",
+    plan: "Plan",
+    predictor: "Predictor",
     wanted: list[Files],
     writing: Writing,
-    past: "Motion",
     *,
     note: "Callable[[], None]" = lambda: None,
 ) -> int:
-    """Write the futures, all of them at once, and say so; after an interruption those that were finished."""
+    """Make and write the futures, all of them at once, and say so; after an interruption those that were finished."""
+    from motionloom.tasks.run import Models
+
+    models, past = Models(arguments.loop_weights, predictor_weights=predictor, device=arguments.device), plan.people[0]
+    if arguments.loop:
+        assert models.prior  # loaded before anything is drawn
     written: list[Path] = []
     given = _frames_at(arguments, past, len(past))
 
@@ -183,8 +176,9 @@ def _written(
         put=lambda motions: at_rate(motions, arguments.fps),
         what="futures",
     )
-    interrupted = made.take(all_looped(arguments, drawn))
-    _report(arguments, [str(file) for file in written], made.count)
+    drawn = results("predicting", plan, models)
+    interrupted = made.take((list(one.people) for one in drawn), told=arguments.json)
+    _report(arguments, [str(file) for file in written], made.count, made.happened)
     note()
     note_rate(arguments, _inputs(arguments))
     return made.ended(interrupted)
@@ -193,6 +187,7 @@ def _written(
 def run_switch(arguments: argparse.Namespace) -> int:
     """``motionloom switch PAST TARGET``."""
     from motionloom.io import check_output
+    from motionloom.tasks.run import Plan
 
     check_rate(arguments)
     outs = arguments.out or [Path("switch.bvh")]
@@ -211,21 +206,9 @@ def run_switch(arguments: argparse.Namespace) -> int:
     _check_poses(arguments, (len(past) + len(target) + round(arguments.seconds * past.fps)) * len(past.skeleton))
     check_loop_behind(arguments, past.seconds, arguments.seconds + target.seconds, f"{arguments.target} ends otherwise")
     predictor = _predictor(arguments)
-    from motionloom.tasks.predict import switch
-
-    drawn = (
-        switch(
-            predictor,
-            past,
-            target,
-            seconds=arguments.seconds,
-            facing=arguments.facing,
-            foot_lock=arguments.foot_lock,
-            **sampling_of(arguments) | some,
-        )
-        for some, _ in groups(arguments.count, TOGETHER, lambda done, total: None)
-    )
-    return _written(arguments, drawn, wanted, writing, past)
+    values = request_of(arguments, Switch, {"motion": past, "target": target})
+    plan = Plan(task="switch", values=values, sampling=values.sampling, people=(past,), target=target)
+    return _written(arguments, plan, predictor, wanted, writing)
 
 
 # Futures of any length
@@ -427,7 +410,7 @@ def _note_seen(predictor: "Predictor", past: "Motion") -> None:
         print(f"note: of the {there:.2f} s of the past the predictor sees the last {seen:.2f}", file=sys.stderr)
 
 
-def _report(arguments: argparse.Namespace, written: list[str], count: int) -> None:
+def _report(arguments: argparse.Namespace, written: list[str], count: int, happened: Sequence[Any] = ()) -> None:
     if arguments.json:
         import json
 
@@ -438,6 +421,7 @@ def _report(arguments: argparse.Namespace, written: list[str], count: int) -> No
             "seed": arguments.seed,
             "weights": str(arguments.weights),
             "files": written,
+            "happened": list(happened),
         }
         print(json.dumps(about, indent=1))
         return

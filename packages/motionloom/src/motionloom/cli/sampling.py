@@ -2,10 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from motionloom.cli.newcomers import one_sentence, suggestion, with_options
 from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
@@ -14,10 +14,14 @@ from motionloom.cli.writing import add_writing, check_rate, check_unit
 from motionloom.formats import writable
 from motionloom.requests.fields import specs
 from motionloom.requests.generate import Generate
+from motionloom.requests.reading import make
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
+    from motionloom.tasks.run import Models, Plan, Result
     from motionloom.weights.prior import Prior
+
+R = TypeVar("R")
 
 
 def add_sampling(
@@ -59,23 +63,23 @@ def add_out(parser: argparse.ArgumentParser, meaning: str) -> None:
 
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
-    names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance", "bodies")
+    names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance", "bodies", "best_of")
     found: dict[str, Any] = {name: getattr(arguments, name, None) for name in names}
     return {name: value for name, value in found.items() if value is not None}
 
 
-def moves(progress: Callable[[int, int], None], steps: int | None, rows: int) -> Callable[[int], None]:
-    """What a chain of ``rows`` says of its moves, as a progress bar takes it."""
-    from motionloom.requests.sampling import STEPS
+def request_of(arguments: argparse.Namespace, request: type[R], own: Mapping[str, Any]) -> R:
+    """The request that the line says; own: values of fields that are said otherwise than by an option of their name."""
+    said = {name: getattr(arguments, name) for name in specs(request) if hasattr(arguments, name)}
+    return make(request, said | dict(own))
 
-    done, total = 0, (steps or STEPS) * rows
 
-    def more(count: int) -> None:
-        nonlocal done
-        done += count
-        progress(done, total)
+def results(label: str, plan: "Plan", models: "Models") -> "Iterator[Result]":
+    """What a task makes, while a bar shows how far it is."""
+    from motionloom.tasks.run import run
 
-    return more
+    with bar(label) as progress:
+        yield from run(plan, models, progress)
 
 
 def add_adapters(parser: argparse.ArgumentParser) -> None:

@@ -1,12 +1,15 @@
 """Parsed untrusted JSON or YAML, taken apart so that every mistake is reported with the name of its key."""
 
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any, NoReturn
 
 from motionloom.errors import MotionloomError, kind_of, listed, meant, quoted
+from motionloom.io.lined_yaml import read_lined
 
 
 @dataclass(frozen=True)
@@ -19,9 +22,18 @@ class Field:
     """The file, as messages begin; empty for a mapping from elsewhere."""
 
     def fail(self, message: str) -> NoReturn:
-        """Raise a `MotionloomError` that names the file and the key."""
+        """Raise a `MotionloomError` that names the file, the line and the key."""
         said = f"'{self.name}' {message}" if self.name else f"the goal {message}"
-        raise MotionloomError(f"{self.source}: {said}" if self.source else said)
+        raise MotionloomError(f"{self.source}{self._line()}: {said}" if self.source else said)
+
+    def _line(self) -> str:
+        """On which line of the file the value is, in words; nothing where that cannot be told."""
+        with suppress(MotionloomError):
+            found: Any = read_lined(self.source)
+            for key in re.findall(r"[^.\[\]]+", self.name):
+                found = found.value[int(key) if isinstance(found.value, list) else key]
+            return f", line {found.key_line or found.line}"
+        return ""
 
     def wrong(self, wanted: str) -> NoReturn:
         """Say what was wanted and what is there."""

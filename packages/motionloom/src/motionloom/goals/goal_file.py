@@ -69,7 +69,10 @@ def read_goal(
     if isinstance(source, Mapping):
         return _Reader(frames, fps, folder, metre).goal(Field(source))
     path = Path(source)
-    return _Reader(frames, fps, path.parent, metre).goal(Field(_parsed(path), source=str(path)))
+    found = _parsed(path)
+    if isinstance(found, dict):
+        found.pop("$schema", None)  # for editors
+    return _Reader(frames, fps, path.parent, metre).goal(Field(found, source=str(path)))
 
 
 def _parsed(path: Path) -> Any:

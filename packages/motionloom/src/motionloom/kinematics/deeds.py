@@ -3,7 +3,7 @@
 Read off the joints alone, whatever the words were; `motionloom info`, the server and assistants tell it of any motion.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -117,6 +117,11 @@ class Deeds:
             return f"{does} {self.way:.1f} m and ends where it began"
         where = _direction(self.forward, self.left, "ahead", "behind")
         return f"{does} {self.way:.1f} m, to a place {self._net:.1f} m {where}"
+
+
+def happened(people: Iterable[Motion]) -> list[dict[str, Any] | None]:
+    """What each of some people did, as plain values for JSON; None as of `measure_deeds`."""
+    return [did and did.public() for did in map(measure_deeds, people)]
 
 
 def measure_deeds(motion: Motion) -> Deeds | None:

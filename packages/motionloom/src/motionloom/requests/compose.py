@@ -19,4 +19,4 @@ class Compose(Finish):
     guidance: float | None = like(
         Sampling, "guidance", "strength of the text where a segment has none of its own: 2.5", default=None
     )
-    sampling: Sampling = group(Sampling(count=1), "count", "steps")
+    sampling: Sampling = group(Sampling(count=1), "count", "steps", "best_of")

@@ -25,4 +25,4 @@ class Duet(Finish):
     guidance: float | None = like(
         PairSampling, "guidance", "strength of the text: 2.5, or the timeline's", default=None
     )
-    sampling: PairSampling = group(PairSampling(count=1), "count", "steps", "pair_guidance", "bodies")
+    sampling: PairSampling = group(PairSampling(count=1), "count", "steps", "best_of", "pair_guidance", "bodies")

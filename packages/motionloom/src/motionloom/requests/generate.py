@@ -15,11 +15,4 @@ class Generate(Finish):
     seconds: float | None = seconds("length of each motion: 5, or of several actions in a sentence what they take")
     as_one: bool = declare("flag", "do not part 'A, then B' into actions that follow each other", False)
     literal: bool = declare("flag", "do not read numbers as goals: '3 meters', 'turns left 90 degrees'", False)
-    best_of: int = declare(
-        "whole",
-        "of each motion begin so many and keep the one that does most of what its words allow to check",
-        1,
-        low=1,
-        high=16,
-    )
     sampling: Sampling = group(Sampling(count=1), *SAMPLED, "solver")

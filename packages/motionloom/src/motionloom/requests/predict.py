@@ -9,7 +9,7 @@ from motionloom.requests.shared import Finish, seconds
 
 DAY = 86_400
 """Seconds."""
-NAMES = ("seed", "count", "guidance", "steps", "temperature")
+NAMES = ("seed", "count", "guidance", "steps", "best_of", "temperature")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Requests from what doors get: keys of a JSON object, columns of a row, what was typed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -21,6 +21,17 @@ def make(request: type[R], values: Mapping[str, Any]) -> R:
         elif one.name in values:
             own[one.name] = values[one.name]
     return request(**own)
+
+
+def settled(values: Any, timeline: Any = None, *, but: Container[str] = ()) -> Any:
+    """A request's sampling, with the seed and guidance that it says beside it, or else its timeline.
+
+    but: names that the timeline does not say, since the request did.
+    """
+    own = {name: getattr(values, name, None) for name in ("seed", "guidance")}
+    left = {name: getattr(timeline, name, None) for name, value in own.items() if value is None and name not in but}
+    said = {name: value for name, value in (own | left).items() if value is not None}
+    return replace(values.sampling, **said)
 
 
 def read(

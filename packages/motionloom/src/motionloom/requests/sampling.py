@@ -34,6 +34,7 @@ class Settings(TypedDict, total=False):
     count: int | None
     first: int
     batch_size: int | None
+    best_of: int
 
 
 class PredictionSettings(Settings, total=False):
@@ -75,6 +76,13 @@ class Sampling(Checked):
         "whole", "number of the first motion, so that very many are made in several calls", 0, low=0, high=LARGEST_SEED
     )
     batch_size: int | None = declare("whole", "rows in one network call at most", low=1)
+    best_of: int = declare(
+        "whole",
+        "of each motion begin so many and keep the one that does most of what its words allow to check",
+        1,
+        low=1,
+        high=16,
+    )
 
     @classmethod
     def of(cls, sampling: Self | None, settings: Mapping[str, Any]) -> Self:

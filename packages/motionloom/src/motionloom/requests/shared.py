@@ -9,7 +9,7 @@ LONGEST = 60.0
 """Seconds: beyond this one prompt is no longer one action."""
 LONGEST_PROMPT = 20_000
 """Characters."""
-SAMPLED = ("seed", "count", "guidance", "steps")
+SAMPLED = ("seed", "count", "guidance", "steps", "best_of")
 FINISH = ("foot_lock", "loop", "blend")
 """Fields that most tasks have."""
 

@@ -12,7 +12,7 @@ from motionloom.errors import MotionloomError, listed, meant, quoted
 from motionloom.goals.fields import Field
 from motionloom.goals.timeline import Timeline, timeline_of
 from motionloom.requests.fields import Spec, specs
-from motionloom.requests.reading import read
+from motionloom.requests.reading import read, settled
 from motionloom.requests.tasks import REQUESTS
 from motionloom.requests.timeline import SECONDS
 from motionloom.server.limits import Limits
@@ -111,12 +111,6 @@ def _levels(value: Any, limits: Limits) -> int:
     return replace(LEVELS, high=limits.steps).check(value, "'levels'")
 
 
-def _with_own(found: JobRequest) -> JobRequest:
-    """Sampled with the request's own seed and guidance, where a task leaves them to its timeline."""
-    own = {name: getattr(found.values, name, None) for name in ("seed", "guidance")}
-    return replace(found, sampling=replace(found.sampling, **{n: one for n, one in own.items() if one is not None}))
-
-
 class _Reader:
     """A request whose motions, timelines and goals are being read."""
 
@@ -138,9 +132,7 @@ class _Reader:
 
     def compose(self, found: JobRequest) -> JobRequest:
         timeline = timeline_from_json(self.given["timeline"], self.project, self.limits)
-        said = {name: getattr(timeline, name) for name in ("seed", "guidance") if name not in self.given}
-        said = {name: value for name, value in said.items() if value is not None}
-        found = _with_own(replace(found, sampling=replace(found.sampling, **said)))
+        found = replace(found, sampling=settled(found.values, timeline, but=self.given))
         parts = () if timeline.path is None else (("path", timeline.path),)
         return replace(found, timeline=timeline, goal=timeline.path, parts=parts)
 
@@ -179,7 +171,7 @@ class _Reader:
             raise MotionloomError(f"'goals' do not go with '{kinds[0]}'; a timeline has a 'path' of its own")
         if kinds == ["timeline"]:
             return self.compose(found)
-        found = _with_own(found)
+        found = replace(found, sampling=settled(values))
         if kinds == ["react_to"]:
             if values.seconds is not None:
                 raise MotionloomError("an answer is as long as the motion it answers; leave out 'seconds'")

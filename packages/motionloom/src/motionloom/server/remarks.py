@@ -6,7 +6,7 @@ from motionloom.goals.remarks import numbers_read, parts_read, remarks_on, remar
 from motionloom.server.job_request import JobRequest
 
 if TYPE_CHECKING:
-    from motionloom.server.drawing import Models
+    from motionloom.tasks.run import Models
 
 MOST = 64
 """Texts of one job that are looked at."""

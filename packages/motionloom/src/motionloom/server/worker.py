@@ -15,7 +15,7 @@ from motionloom.server.queue import Queue
 from motionloom.server.refusal import Refusal, full_disk
 
 if TYPE_CHECKING:
-    from motionloom.server.drawing import Models, Result
+    from motionloom.tasks.run import Models, Result
     from motionloom.tasks.watching import Denoised
     from motionloom.weights.prior import Prior
 
@@ -129,14 +129,13 @@ class Worker:
             self._draw(models, [job for job in jobs if job.started()])
 
     def _load(self) -> "Models":
-        from motionloom.server.drawing import Models
-        from motionloom.tasks.adapting import adapt
+        from motionloom.tasks.run import Models
         from motionloom.tasks.text import generate
-        from motionloom.weights.prior import Prior
 
-        prior = adapt(Prior.load(self.weights, device=self.device), self.adapters)
-        generate(prior, "a person walks", seconds=1.0, steps=2)  # what the first call makes ready, no client waits for
-        return Models(prior)
+        models = Models(self.weights, device=self.device, adapters=self.adapters)
+        # what the first call makes ready, no client waits for
+        generate(models.prior, "a person walks", seconds=1.0, steps=2)
+        return models
 
     def _draw(self, models: "Models", jobs: Sequence[Job]) -> None:
         """Draw one batch; whatever goes wrong is said in its jobs."""
@@ -185,13 +184,12 @@ class Worker:
             job.end("done")
 
     def _keep(self, job: Job, result: "Result") -> None:
-        from motionloom.kinematics.deeds import measure_deeds
+        from motionloom.kinematics.deeds import happened
 
         request = job.request
-        did = [measure_deeds(one) for one in result.people]
-        happened = [one and one.public() for one in did]
-        about = {"task": request.task, "prompt": request.prompt, "seed": result.seed, "measures": result.measures}
-        about["happened"] = happened
+        did = happened(result.people)
+        about = {"task": request.task, "prompt": request.prompt, "seed": result.seed}
+        about |= {"measures": result.measures, "happened": did}
         stored = self.project.add(result.people, about)
         motion = result.people[0]
         job.add_result(
@@ -203,7 +201,7 @@ class Worker:
                 "frames": len(motion),
                 "people": len(result.people),
                 "measures": result.measures,
-                "happened": happened,
+                "happened": did,
                 "remarks": result.remarks,
             }
         )

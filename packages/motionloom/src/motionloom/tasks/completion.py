@@ -5,7 +5,7 @@ clean. Here what is known is a condition of the network, sampling ends clean, an
 the rest meets it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Unpack
 
@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import quintic_decay
-from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
+from motionloom.diffusion import SOLVERS, Denoiser, guide, row_noise, row_seed, sample
+from motionloom.diffusion.sampling import Snapshot
 from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
-from motionloom.features.positions import bone_lengths, with_bones
+from motionloom.features.positions import SMPL_LAYOUT, Place, bone_lengths, with_bones
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
+from motionloom.tasks.best import alive, seeds_tried, smallest
 from motionloom.tasks.watching import View
 from motionloom.weights.predictor import Predictor
 
@@ -63,28 +65,65 @@ def complete(
     """
     chosen = PredictionSampling.of(sampling, settings)
     condition = predictor.condition(features, mask, pose)
-    yes, no = (np.full(len(condition), flag) for flag in (True, False))
-
-    def net(x: np.ndarray, level: int, cond: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        return predictor.denoiser(*cond)(x, level)
-
-    noise = row_noise(seeds)
-    made = chosen.temperature * noise(np.empty((len(condition), *predictor.mean.shape), np.float32))
     way = chosen.levels(predictor.schedule)
-    walk = sample(
-        guide(net, (condition, yes), (condition, no), chosen.guidance),
-        made,
-        levels=way,
-        solver=SOLVERS[chosen.solver],
-        schedule=predictor.schedule,
-        noise=noise,
-    )
+    if chosen.best_of > 1:
+        seeds = _best_seeds(predictor, condition, pose, seeds=seeds, sampling=chosen, way=way)
+    made, walk = _walk(predictor, condition, seeds, chosen, way)
     if poses is not None:
         view = View(lambda states: poses(predictor.to_features(states, pose)))
         walk = view.reported(walk, len(way) - 1, range(len(condition)))
     for snapshot in walk:
         made = snapshot.state
     return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
+
+
+def _walk(
+    predictor: Predictor,
+    condition: np.ndarray,
+    seeds: Sequence[int],
+    sampling: PredictionSampling,
+    way: Sequence[int],
+) -> tuple[np.ndarray, Iterator[Snapshot]]:
+    """The noise that windows begin with, and the walk from there."""
+    noise = row_noise(seeds)
+    state = sampling.temperature * noise(np.empty((len(condition), *predictor.mean.shape), np.float32))
+    how = {"solver": SOLVERS[sampling.solver], "schedule": predictor.schedule, "noise": noise}
+    return state, sample(_guided(predictor, condition, sampling.guidance), state, levels=way, **how)
+
+
+def _guided(predictor: Predictor, condition: np.ndarray, guidance: float) -> Denoiser:
+    yes, no = (np.full(len(condition), flag) for flag in (True, False))
+
+    def net(x: np.ndarray, level: int, cond: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        return predictor.denoiser(*cond)(x, level)
+
+    return guide(net, (condition, yes), (condition, no), guidance)
+
+
+def _best_seeds(
+    predictor: Predictor,
+    condition: np.ndarray,
+    pose: np.ndarray,
+    *,
+    seeds: Sequence[int],
+    sampling: PredictionSampling,
+    way: Sequence[int],
+) -> list[int]:
+    """For each window the best of several seeds: half way whole, moving, and then nearest to the mean of them all."""
+    count = sampling.best_of
+    tried = [seeds_tried(seed, count) for seed in seeds]
+    several = [seed for one in tried for seed in one]
+    state, walk = _walk(predictor, condition.repeat(count, axis=0), several, sampling, way[: len(way) // 2 + 1])
+    for snapshot in walk:
+        state = snapshot.clean
+    features, layout = predictor.to_features(state, pose.repeat(count, axis=0)), predictor.layout
+    chosen = []
+    for own, candidates in zip(features.reshape(len(seeds), count, *features.shape[1:]), tried, strict=True):
+        away = ((own - own.mean(axis=0)) ** 2).mean(axis=(1, 2))
+        person = layout.names == SMPL_LAYOUT.names
+        before = alive(layout.decode(own, Place(np.zeros(3), np.zeros(())))) if person else [()] * count
+        chosen.append(candidates[smallest([(*rank, float(far)) for rank, far in zip(before, away, strict=True)])])
+    return chosen
 
 
 def joined(made: np.ndarray, known: np.ndarray, mask: np.ndarray, *, ease: int) -> np.ndarray:

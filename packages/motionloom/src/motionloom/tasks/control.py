@@ -26,7 +26,7 @@ from motionloom.requests.shared import LONGEST
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.sampling import Batch, Progress, Rows, sample, to_features
+from motionloom.tasks.sampling import Batch, Progress, Rows, sample
 from motionloom.tasks.text import alone, check_prompts, to_motion
 from motionloom.weights.adapter import Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped
@@ -136,7 +136,7 @@ def steered_features(
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
     made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=alone(prior)))
-    return [to_features(prior, made[row]) for row in range(len(prompts))]
+    return [prior.to_features(made[row]) for row in range(len(prompts))]
 
 
 def blended(

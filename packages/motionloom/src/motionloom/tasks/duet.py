@@ -7,6 +7,7 @@ own way into every further one, at each step.
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from itertools import chain, tee
 from typing import Unpack
@@ -51,7 +52,7 @@ from motionloom.tasks.pair import (
     poses_at,
     stacked,
 )
-from motionloom.tasks.sampling import Moves, Progress, sample_chain, smooth
+from motionloom.tasks.sampling import Moves, Progress, sample_chain
 from motionloom.tasks.splice import apply_positions, person_at_20
 from motionloom.tasks.text import finish
 from motionloom.tasks.watching import ChainView
@@ -243,9 +244,7 @@ def duet_features(
     for row, state in made:
         row.before = None  # what a finished row began with is needed no more
         motion, places = _parted(state)
-        motion = smooth(motion) if prior.net.config.patch > 1 else motion
-        one = row.people[0]
-        features = motion[:, one.before : one.before + one.frames] * prior.std + prior.mean
+        features = row.people[0].between(prior.smoothed(motion)) * prior.std + prior.mean
         yield features, net.places.decode(places).astype(np.float64)
 
 
@@ -277,6 +276,19 @@ class _PairRow:
     """(2, 4) that this row's D began as."""
     ends: dict[int, np.ndarray] = field(default_factory=dict)
     """Relative poses (2, 4) at the frame with which the next row begins, by level of the estimate."""
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What each does."""
+        return tuple(one.text for one in self.people)
+
+    def alone(self) -> "_PairRow":
+        """The row without the one before, and with what is found in it."""
+        return replace(self, bodies=deepcopy(self.bodies), before=None, noise=None, ends={})
+
+    def motions(self, state: np.ndarray) -> np.ndarray:
+        """(2, frames, 263) between the seams."""
+        return self.people[0].between(_parted(state)[0])
 
     @property
     def length(self) -> int:
@@ -367,8 +379,7 @@ class _PairDenoiser:
         """Features (2, frames, 263) of a denoised row between its seams, and the ground poses in the first one."""
         motion, places = _parted(state)
         features, one = motion * self.prior.std + self.prior.mean, row.people[0]
-        own = features[:, one.before : one.before + one.frames]
-        return own, two.later(features, self._begin_or(places, row, level), one.before)
+        return one.between(features), two.later(features, self._begin_or(places, row, level), one.before)
 
     def poses(self, kept: list[tuple[np.ndarray, np.ndarray]]) -> Array:
         """(2, frames, 22, 3) of what was `kept` of rows."""

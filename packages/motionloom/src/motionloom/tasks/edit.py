@@ -7,7 +7,7 @@ sampled goes through the network, so that the time does not grow with the length
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal, TypeAlias, Unpack
+from typing import Literal, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,7 +190,7 @@ def edit(
     clip = motion if skeleton == "own" else to_smpl22(motion)
     stages = sum(len(one.frames(clip)) if isinstance(one, Redraw) else 1 for one in asked)
     seeds = chosen.seeds(chosen.number())
-    sampler = _Sampler(prior, text, chosen, foot_lock, _counted(progress, len(seeds) * stages * chosen.steps))
+    sampler = _Sampler(prior, text, chosen, foot_lock, _in_stages(progress, len(seeds) * stages, chosen.steps))
     made = []
     for seed in seeds:
         version = clip
@@ -237,17 +237,17 @@ def changes_asked(
     return asked
 
 
-def _counted(progress: Progress | None, calls: int) -> Progress:
-    """What counts the calls of all stages of all versions."""
-    counted = 0
+def _in_stages(progress: Progress | None, stages: int, steps: int) -> Progress:
+    """What the stages of all versions report to, one after the other, each as so many steps."""
+    before = 0
 
-    def tick(*_: Any) -> None:
-        nonlocal counted
-        counted += 1
+    def report(done: int, calls: int) -> None:
+        nonlocal before
         if progress:
-            progress(counted, calls)
+            progress(round((before + done / calls) * steps), stages * steps)
+        before += done == calls
 
-    return tick
+    return report
 
 
 @dataclass(frozen=True, eq=False)

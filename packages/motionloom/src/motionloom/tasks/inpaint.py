@@ -17,7 +17,7 @@ from motionloom.features.layout import LAYOUT
 from motionloom.ground import GroundPose
 from motionloom.motion import ground_pose
 from motionloom.requests.sampling import Sampling
-from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample, smooth
+from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
@@ -60,7 +60,7 @@ def inpaint_motion(
         prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses, begin=window.begin)
     )
     made = state[None] * spread + prior.mean
-    made = reach(meet(np.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
+    made = reach(meet(np.where(mask, known, prior.smoothed(made))))
     contacts = made[0, :, LAYOUT["contacts"]].astype(np.float64)
     return Inpainted(_placed(made[0], known[0], window, place), contacts)
 

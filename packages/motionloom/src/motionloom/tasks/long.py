@@ -49,6 +49,7 @@ LOOK_BACK = 20
 
 @dataclass(frozen=True, eq=False)
 class Row:
+    text: str
     frames: int
     """Between its seams."""
     before: int
@@ -66,6 +67,20 @@ class Row:
     @property
     def length(self) -> int:
         return self.before + self.frames + self.after
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        return (self.text,)
+
+    def alone(self) -> "Row":
+        return self
+
+    def motions(self, state: np.ndarray) -> np.ndarray:
+        return self.between(state)[None]
+
+    def between(self, states: np.ndarray) -> np.ndarray:
+        """The frames (..., frames, features) between the seams."""
+        return states[..., self.before : self.before + self.frames, :]
 
 
 def compose(
@@ -182,7 +197,7 @@ def long_features(
     place = past.end if past else GroundPose()
 
     def features(row: Row, state: np.ndarray, _: int = 0) -> np.ndarray:
-        return state[row.before : row.before + row.frames] * prior.std + prior.mean
+        return row.between(state) * prior.std + prior.mean
 
     def poses(pieces: list[np.ndarray]) -> Array:
         return decoded(np.concatenate(pieces).astype(np.float64), place)[0][None]
@@ -231,7 +246,18 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past:
         if segment.goal and not segment.goal.empty:
             edits.append(toward(segment.goal, prior, first=before))
         scale = guidance if segment.guidance is None else segment.guidance
-        yield Row(frames, before, overlap // 2, overlap, scale, bound, null, _one_after_the_other(edits), own.net)
+        yield Row(
+            segment.text,
+            frames,
+            before,
+            overlap // 2,
+            overlap,
+            scale,
+            bound,
+            null,
+            _one_after_the_other(edits),
+            own.net,
+        )
         before, segment, number = overlap // 2, following, number + 1
 
 

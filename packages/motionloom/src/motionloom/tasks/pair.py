@@ -5,6 +5,7 @@ each relative to the own first frame; the relative pose of the two is sampled wi
 """
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Unpack
 
@@ -34,7 +35,7 @@ from motionloom.retarget.anatomy import read_body
 from motionloom.runtime.pair import PLACE, PairSession, join, part
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Past, lengthened
-from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample, smooth
+from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
 from motionloom.tasks.splice import concatenated, continued
 from motionloom.tasks.text import finish, frames_in
 from motionloom.tasks.watching import View
@@ -110,13 +111,14 @@ def pair_features(
     def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
         return _corrected(state, [changes[i] for i in batch], level)
 
-    def two_bodies(state: np.ndarray, batch: list[int], level: int) -> np.ndarray:
+    def two_bodies(own: list[Bodies], state: np.ndarray, batch: list[int], level: int) -> np.ndarray:
         if not chosen.bodies or net.silent:
             return state
-        apart = _two_bodies(prior, net, [bodies[row // 2] for row in batch[::2]], state, level)
-        return np.where(mask[batch], state, apart)
+        return np.where(mask[batch], state, _two_bodies(prior, net, own, state, level))
 
     def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
+        own = [bodies[row // 2] for row in batch.rows[::2]]
+        own = [deepcopy(one) for one in own] if batch.trial else own
         guided = relative_pose_guidance(
             prior,
             net,
@@ -129,7 +131,7 @@ def pair_features(
 
         def changed(state: np.ndarray, level: int) -> np.ndarray:
             led = guided(state, corrected(denoise(state, level), batch.rows, level), level)
-            return two_bodies(led, batch.rows, level)
+            return two_bodies(own, led, batch.rows, level)
 
         return changed
 
@@ -139,11 +141,10 @@ def pair_features(
     walk = sample(prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=view)
     made = dict(walk)
     state = np.stack([made[row] for row in range(rows)])
-    if prior.net.config.patch > 1:
-        state = np.concatenate([state[:, :1], smooth(state[:, 1:])], axis=1)
+    state = np.concatenate([state[:, :1], prior.smoothed(state[:, 1:])], axis=1)
     if given.observed is not None:
         state = np.where(mask, given.observed.values, state)
-    places, motion = part(two_bodies(corrected(state, range(rows), 0), list(range(rows)), 0))
+    places, motion = part(two_bodies(bodies, corrected(state, range(rows), 0), list(range(rows)), 0))
     return people(motion * prior.std + prior.mean), net.places.decode(people(places))
 
 

@@ -6,7 +6,7 @@ edits of the denoiser (goals, boundaries, the other person) and what it has `Obs
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeAlias, TypeVar
+from typing import Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -26,7 +26,9 @@ from motionloom.diffusion import (
 from motionloom.diffusion import sample as denoising
 from motionloom.requests.sampling import Sampling
 from motionloom.runtime.pair import PairSession
+from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
+from motionloom.tasks.best import best, seeds_tried
 from motionloom.tasks.watching import ChainView, Latest, View
 from motionloom.weights.prior import Prior
 
@@ -64,8 +66,11 @@ class Batch:
     """Their numbers among all."""
     cond: Condition
     seeds: list[int]
+    trial: bool = False
+    """Whether these are candidates, several of a row: nothing that an edit finds in them is for the row."""
 
 
+Network: TypeAlias = PriorSession | PairSession
 Edit: TypeAlias = Callable[[Denoiser, Batch], Denoiser]
 """Changes the guided denoiser of a batch."""
 
@@ -94,7 +99,7 @@ def sample(
     rows: Rows,
     sampling: Sampling,
     *,
-    network: PairSession | None = None,
+    network: Network | None = None,
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
     halfway: bool = False,
@@ -106,10 +111,17 @@ def sample(
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. edits: of each
     batch's guided denoiser, after what is observed was put in, the first one first. halfway: stop after half of the
     calls and give the denoised estimates. view: how each network call is seen by who is `watching`; None: nobody can.
+    Where the sampling asks for the best of several, each motion's seed is chosen first (`with_best_seeds`).
     Raises MotionloomError for more steps than the weights have levels.
     """
     net = prior.net if network is None else network
     way = sampling.levels(prior.schedule, observed.strength if observed else 1.0)
+    if sampling.best_of > 1 and not halfway:
+        people, calls = view.people if view else 1, len(rows.batches(sampling.batch())) * (len(way) - 1)
+        choosing, progress = _in_turn(progress, of=calls)
+        rows = with_best_seeds(
+            prior, rows, sampling, network=net, edits=edits, observed=observed, people=people, progress=choosing
+        )
     batches, done = rows.batches(sampling.batch()), 0
     if halfway:
         way = way[: len(way) // 2 + 1]
@@ -146,20 +158,67 @@ def sample(
         yield from zip(numbers, state, strict=True)
 
 
-def smooth(features: np.ndarray) -> np.ndarray:
-    """(..., frames, numbers) weighted 1/6, 2/3, 1/6 along time, ends repeated.
+def with_best_seeds(
+    prior: Prior,
+    rows: Rows,
+    sampling: Sampling,
+    *,
+    network: Network | None = None,
+    edits: Sequence[Edit] = (),
+    observed: Observed | None = None,
+    people: int = 1,
+    progress: Progress | None = None,
+) -> Rows:
+    """The same rows, each motion with the best of ``sampling.best_of`` seeds (`tasks.best`).
 
-    A network whose tokens hold several frames makes each token smooth and leaves small steps between them.
+    people: rows of one motion, which lie next to each other. progress: called after each network call with the calls
+    done and the calls there are for choosing. The rest as of `sample`.
     """
-    before = np.concatenate([features[..., :1, :], features[..., :-1, :]], axis=-2)
-    after = np.concatenate([features[..., 1:, :], features[..., -1:, :]], axis=-2)
-    return (before + 4 * features + after) / 6
+    count, motions = sampling.best_of, range(0, len(rows.seeds), people)
+    of = [row for first in motions for _ in range(count) for row in range(first, first + people)]
+    tried = [seeds_tried(seed, count) for seed in rows.seeds]
+    seeds = [tried[row][place // people % count] for place, row in enumerate(of)]
+    several = replace(
+        rows, prompts=[rows.prompts[row] for row in of], lengths=[rows.lengths[row] for row in of], seeds=seeds
+    )
+    made = sample(
+        prior,
+        several,
+        sampling,
+        network=network,
+        edits=[_on_candidates(edit, of) for edit in edits],
+        observed=observed and observed.of(of),
+        halfway=True,
+        progress=progress,
+    )
+    estimates, chosen = dict(made), list(rows.seeds)
+    level = sampling.levels(prior.schedule)[0]
+    for first in motions:
+        own = range(first, first + people)
+        states = np.stack([estimates[first * count + place] for place in range(count * people)])
+        states = states.reshape(count, people, *states.shape[1:])[:, :, people - 1 :]  # two have a slot before frame 0
+        number = best(prior, [rows.prompts[row] for row in own], states, seeds=tried[first], level=level)
+        chosen[first : first + people] = [tried[row][number] for row in own]
+    return replace(rows, seeds=chosen)
 
 
-def to_features(prior: Prior, states: np.ndarray) -> np.ndarray:
-    """Standardised states (..., frames, features) to features, smoothed where tokens hold several frames."""
-    features = states * prior.std + prior.mean
-    return smooth(features) if prior.net.config.patch > 1 else features
+def _on_candidates(edit: Edit, of: Sequence[int]) -> Edit:
+    """The edit of rows for candidates, of which ``of`` says whose they are."""
+    return lambda denoise, batch: edit(denoise, replace(batch, rows=[of[i] for i in batch.rows], trial=True))
+
+
+def _in_turn(progress: Progress | None, *, of: int) -> tuple[Progress | None, Progress | None]:
+    """What two parts of a job report to, the second of ``of`` calls, so that ``progress`` sees one job."""
+    if progress is None:
+        return None, None
+    before = 0
+
+    def first(done: int, calls: int) -> None:
+        nonlocal before
+        before = calls
+        progress(done, calls + of)
+
+    return first, lambda done, calls: progress(before + done, before + calls)
 
 
 # Rows of a chain
@@ -167,6 +226,19 @@ def to_features(prior: Prior, states: np.ndarray) -> np.ndarray:
 
 class ChainRow(Protocol):
     """A row of a chain."""
+
+    @property
+    def texts(self) -> Sequence[str]:
+        """What each person does."""
+        ...
+
+    def alone(self) -> Self:
+        """The row without its neighbours, for a candidate: what is found in it is not for the row itself."""
+        ...
+
+    def motions(self, state: State) -> np.ndarray:
+        """(people, frames, features) of a state (length, features), without what belongs to the neighbours."""
+        ...
 
     @property
     def length(self) -> int:
@@ -198,19 +270,39 @@ def sample_chain(
     """Rows of a chain whose ends overlap, each with its clean state (length, features), in order.
 
     rows: read as sampling gets there; they may be endless. denoise: rows, their states and levels to the denoised
-    states. Row i is sampled from ``seed + i``. batch_size: rows in one call unless ``sampling`` says it. view: how
-    rows make motions and are seen by who is `watching`; where they make several, row i of motion m is sampled from
-    ``seed + m + i``.
+    states. Row i is sampled from ``seed + i``, or from the best of several seeds, by candidates of the row alone.
+    batch_size: rows in one call unless ``sampling`` says it. view: how rows make motions and are seen by who is
+    `watching`; where they make several, row i of motion m is sampled from ``seed + m + i``.
     """
     way, [first] = sampling.levels(prior.schedule), sampling.seeds(1)
     waiting: dict[int, R] = {}
+    moved = progress or (lambda count: None)
     seen = Latest(view, len(way) - 1)
 
     def links() -> Iterator[Link]:
         for number, row in enumerate(rows):
             waiting[number] = row
             motion, own = divmod(number, view.each) if view.each else (0, number)
-            yield Link(row.length, row.overlap, first + motion + own)
+            seeds = seeds_tried(first + motion + own, sampling.best_of)
+            yield Link(row.length, row.overlap, best_seed(row, seeds))
+
+    def best_seed(row: R, seeds: list[int]) -> int:
+        if len(seeds) == 1:
+            return seeds[0]
+        noise, several, states = row_noise(seeds), [row.alone() for _ in seeds], np.empty(0)
+        walk = denoising(
+            lambda states, level: np.stack(denoise(several, list(states), [level] * len(seeds))),
+            noise(np.empty((len(seeds), row.length, features), np.float32)),
+            levels=way[: len(way) // 2 + 1],
+            solver=SOLVERS[sampling.solver],
+            schedule=prior.schedule,
+            noise=noise,
+        )
+        for snapshot in walk:
+            states = snapshot.clean
+            moved(0)
+        motions = np.stack([row.motions(state) for state in states])
+        return seeds[best(prior, row.texts, motions, seeds=seeds, level=way[0])]
 
     def reported(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         some = [waiting[number] for number in numbers]
@@ -226,7 +318,7 @@ def sample_chain(
         schedule=prior.schedule,
         features=features,
         batch_size=sampling.batch(batch_size),
-        moved=progress or (lambda count: None),
+        moved=moved,
     )
     for number, state in enumerate(made):
         yield waiting.pop(number), state

@@ -16,16 +16,13 @@ from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.requests.fields import specs
-from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import GUIDANCE as GUIDANCE
 from motionloom.requests.sampling import LARGEST_SEED, Sampling, Settings
 from motionloom.requests.sampling import SOLVER as SOLVER
 from motionloom.requests.sampling import SPACING as SPACING
 from motionloom.requests.sampling import STEPS as STEPS
 from motionloom.requests.shared import LONGEST
-from motionloom.tasks.best import with_best_seeds
-from motionloom.tasks.sampling import Progress, Rows, sample, to_features
-from motionloom.tasks.sampling import smooth as smooth
+from motionloom.tasks.sampling import Progress, Rows, sample
 from motionloom.tasks.supported import supported
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
@@ -37,7 +34,6 @@ def sample_features(
     frames: Sequence[int],
     *,
     seeds: Sequence[int],
-    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -48,14 +44,13 @@ def sample_features(
         prompts: one per row; an empty one is refused.
         frames: length of each row.
         seeds: one per row; a row depends on its own prompt, length and seed alone.
-        best_of: as of `generate`.
         sampling: or single settings of it as keywords.
         progress: called after each network call.
 
     Raises:
         MotionloomError: for what cannot be asked.
     """
-    made = dict(_sampled(prior, prompts, frames, seeds, best_of, Sampling.of(sampling, settings), progress))
+    made = dict(_sampled(prior, prompts, frames, seeds, Sampling.of(sampling, settings), progress))
     return [made[row] for row in range(len(prompts))]
 
 
@@ -64,35 +59,15 @@ def _sampled(
     prompts: Sequence[str],
     frames: Sequence[int],
     seeds: Sequence[int],
-    best_of: int,
     sampling: Sampling,
     progress: Progress | None,
 ) -> Iterator[tuple[int, np.ndarray]]:
     """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
     check_prompts(prompts)
-    best_of = specs(Generate)["best_of"].check(best_of, "best_of")
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
         raise MotionloomError(f"seed must be {specs(Sampling)['seed'].range}; got {min(seeds)}")
-    rows = Rows(prompts, frames, seeds)
-    if best_of > 1:
-        choosing, progress = _in_turn(progress, of=len(rows.batches(sampling.batch())) * sampling.steps)
-        rows = with_best_seeds(prior, rows, best_of, sampling, progress=choosing)
-    for row, state in sample(prior, rows, sampling, progress=progress, view=alone(prior)):
-        yield row, to_features(prior, state)
-
-
-def _in_turn(progress: Progress | None, *, of: int) -> tuple[Progress | None, Progress | None]:
-    """What two parts of a job report to, the second of ``of`` calls, so that ``progress`` sees one job."""
-    if progress is None:
-        return None, None
-    before = 0
-
-    def first(done: int, calls: int) -> None:
-        nonlocal before
-        before = calls
-        progress(done, calls + of)
-
-    return first, lambda done, calls: progress(before + done, before + calls)
+    for row, state in sample(prior, Rows(prompts, frames, seeds), sampling, progress=progress, view=alone(prior)):
+        yield row, prior.to_features(state)
 
 
 def generate(
@@ -102,7 +77,6 @@ def generate(
     seconds: float | Sequence[float] | None = None,
     literal: bool = False,
     foot_lock: bool = True,
-    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -117,11 +91,9 @@ def generate(
         literal: leave numbers in the words to the network. Otherwise "3 meters", "turns left 90 degrees", "jumps twice"
             are kept; `tasks.worded.generate_worded` says what was read and what was drawn of it.
         foot_lock: keep planted feet still, and feet above the floor.
-        best_of: 1 to 16; so many seeds are sampled half way for each motion, and the one is kept that does most of what
-            its words allow to check, whole, moving, and near to what they usually look like (`tasks.best`); 4 take two
-            to three times as long.
         sampling: how it is sampled; single settings of it may be given as keywords: ``count=2, seed=3, steps=12``.
-            Motion i of the answer is sampled from ``seed + i`` alone.
+            Motion i of the answer is sampled from ``seed + i`` alone, or with ``best_of`` (2 to 16) from the best of so
+            many seeds, which are sampled half way (`tasks.best`); 4 take two to three times as long.
         progress: called after each network call with the calls done and the calls in all.
 
     Returns:
@@ -138,7 +110,6 @@ def generate(
         seconds=seconds,
         literal=literal,
         foot_lock=foot_lock,
-        best_of=best_of,
         sampling=sampling,
         progress=progress,
         **settings,
@@ -152,7 +123,6 @@ def generate_each(
     *,
     seconds: float | Sequence[float] = 5.0,
     foot_lock: bool = True,
-    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -174,7 +144,7 @@ def generate_each(
     count = chosen.number()
     said = [prompt for prompt in said for _ in range(count)]
     frames = [frames_in(length, prior.fps) for length in lengths for _ in range(count)]
-    for row, features in _sampled(prior, said, frames, chosen.seeds(len(said)), best_of, chosen, progress):
+    for row, features in _sampled(prior, said, frames, chosen.seeds(len(said)), chosen, progress):
         yield row, finish(prior, features, foot_lock=foot_lock)
 
 
@@ -185,7 +155,7 @@ def alone(prior: Prior) -> View:
 
 def places_of(prior: Prior, states: np.ndarray) -> np.ndarray:
     """(rows, frames, 22, 3) metres of standardised states (rows, frames, numbers); bones may breathe."""
-    features = to_features(prior, states)
+    features = prior.to_features(states)
     if features.shape[-1] == WIDTH:
         return humanml.decode_positions(features)
     return np.stack([finish(prior, row, foot_lock=False).positions() for row in features])

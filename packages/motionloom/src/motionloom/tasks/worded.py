@@ -134,7 +134,6 @@ def generate_worded(
     seconds: float | Sequence[float] | None = None,
     literal: bool = False,
     foot_lock: bool = True,
-    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -162,7 +161,7 @@ def generate_worded(
         for _ in range(chosen.number())
     ]
     settled = replace(chosen, seed=chosen.seeds(1)[0], first=0)
-    made = draw(prior, asked, foot_lock=foot_lock, best_of=best_of, sampling=settled, progress=progress)
+    made = draw(prior, asked, foot_lock=foot_lock, sampling=settled, progress=progress)
     unknown = remarks_on([segment.text for one in asked for segment in one.segments], prior.known, prior.text)
     return [
         replace(one, unknown={part.text: unknown[part.text] for part in one.timeline.segments if part.text in unknown})
@@ -175,13 +174,12 @@ def draw(
     asked: Sequence[Timeline],
     *,
     foot_lock: bool = True,
-    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Worded]:
     """The motions of timelines in their order, each from its own seed; those of one free action are drawn together.
 
-    Motion i is sampled from ``sampling.seed + i``. best_of, foot_lock, sampling: as of `motionloom.generate`, but that
+    Motion i is sampled from ``sampling.seed + i``. foot_lock, sampling: as of `motionloom.generate`, but that
     ``sampling.count`` is not looked at. Raises `MotionloomError` for what cannot be asked.
     """
     sampling, done = sampling or Sampling(), 0
@@ -198,7 +196,6 @@ def draw(
                 [one.segments[0].text for one in several],
                 seconds=[one.segments[0].seconds for one in several],
                 foot_lock=foot_lock,
-                best_of=best_of,
                 sampling=replace(sampling, seed=seed + done, count=1),
                 progress=progress,
             )

@@ -92,6 +92,21 @@ class Prior:
         """``std``, with 1 for numbers that never change."""
         return np.where(self.std > 0, self.std, np.float32(1))
 
+    def to_features(self, states: Array) -> Array:
+        """Standardised states (..., frames, features) to features, `smoothed`."""
+        return self.smoothed(states * self.std + self.mean)
+
+    def smoothed(self, features: Array) -> Array:
+        """(..., frames, numbers) weighted 1/6, 2/3, 1/6 along time, ends repeated, where tokens hold several frames.
+
+        Such a network makes each token smooth and leaves small steps between them.
+        """
+        if self.net.config.patch == 1:
+            return features
+        before = np.concatenate([features[..., :1, :], features[..., :-1, :]], axis=-2)
+        after = np.concatenate([features[..., 1:, :], features[..., -1:, :]], axis=-2)
+        return (before + 4 * features + after) / 6
+
     def with_adapters(self, adapters: Sequence[tuple[Adapter, float]]) -> "Prior":
         """The same prior with adapters of `motionloom teach` merged into its weights, each times its factor.
 

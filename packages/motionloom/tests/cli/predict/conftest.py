@@ -35,13 +35,16 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the commands asked of the tasks, which make simple motions and stop where they are told."""
     seen: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def predict(predictor, past, *, count, first, seconds, seed, hold, guidance, root, foot_lock, progress, **walk):
-        seen.update(past=past, count=count, seconds=seconds, seed=seed, hold=hold, guidance=guidance, root=root)
-        seen.update(foot_lock=foot_lock, walk=walk)
+    def predict(predictor, past, *, sampling, seconds, hold, root, foot_lock, progress):
+        seen.update(past=past, count=sampling.count, seconds=seconds, seed=sampling.seed, hold=hold, root=root)
+        walk = {"steps": sampling.steps, "temperature": sampling.temperature}
+        seen.update(foot_lock=foot_lock, walk=walk, guidance=sampling.guidance)
         progress(1, 1)
-        return [stream.joined([past, future(past, seconds, i)]) for i in range(first, first + count)]
+        return [stream.joined([past, future(past, seconds, i)]) for i in sampling.numbers()]
 
-    def predict_pieces(predictor, past, *, seconds, number, count, seed, hold, guidance, root, foot_lock, **walk):
+    def predict_pieces(
+        predictor, past, *, seconds, number, count, seed, hold, guidance, best_of, root, foot_lock, **walk
+    ):
         seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, foot_lock=foot_lock, walk=walk)
         if (number, -1) == seen["stop"]:
             raise seen["problem"]
@@ -52,10 +55,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
                 raise seen["problem"]
             yield whole.frames(at, at + 300)
 
-    def switch(predictor, past, target, *, count, first, seconds, seed, facing, guidance, foot_lock, **walk):
-        seen.update(past=past, target=target, count=count, seconds=seconds, facing=facing, walk=walk)
+    def switch(predictor, past, target, *, sampling, seconds, facing, foot_lock):
+        seen.update(past=past, target=target, count=sampling.count, seconds=seconds, facing=facing)
+        seen["walk"] = {"temperature": sampling.temperature}
         still = [replace(one, translations=None) for one in (past, target)]
-        return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in range(first, first + count)]
+        return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in sampling.numbers()]
 
     for made in (predict, predict_pieces, switch):
         monkeypatch.setattr(task, made.__name__, made)

@@ -16,12 +16,12 @@ from motionloom.goals.goal import FPS, Goal, start_of
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.feet import planted_feet
 from motionloom.motion import Motion
-from motionloom.server.drawing import Models
 from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
 from motionloom.server.mmcp.rigs import Rig, read_rig
 from motionloom.tasks import long, text
 from motionloom.tasks.control import moved
 from motionloom.tasks.edit import Change, Extend, Loop, Redraw, edit
+from motionloom.tasks.run import Models
 from motionloom.tasks.splice import carried_level, concatenated, standing
 
 Array = NDArray[np.float64]

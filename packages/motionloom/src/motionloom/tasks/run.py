@@ -1,0 +1,287 @@
+"""Every task by one function: `run` of a `Plan` gives results, one after the other, whichever door asked.
+
+A door reads a request and what it names into a plan; `run` samples, puts the body together, and closes loops; the door
+writes. Motions that are sampled in one network call are a group: those of a group that is finished stay where the next
+one is interrupted.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from motionloom.goals.adapters import Applied
+from motionloom.goals.goal import Goal
+from motionloom.goals.hold import FixedJoints
+from motionloom.goals.timeline import Timeline
+from motionloom.motion import Motion
+from motionloom.requests.sampling import BATCH
+from motionloom.tasks import control, duet, edit, long, pair, predict, worded
+from motionloom.tasks.adapting import adapt
+from motionloom.tasks.sampling import Moves, Progress
+from motionloom.tasks.splice import concatenated
+from motionloom.tasks.watching import watching
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.predictor import Predictor
+from motionloom.weights.prior import Prior
+
+
+@dataclass(eq=False)
+class Models:
+    """What samples, each loaded when it is first needed: a shipped name, a file, or what is loaded already."""
+
+    weights: Any = "default"
+    pair_weights: Any = "duet"
+    predictor_weights: Any = "predictor"
+    device: str = "cpu"
+    adapters: Sequence[Applied] = ()
+    """Of the prior."""
+
+    @cached_property
+    def prior(self) -> Prior:
+        """What makes one person of words."""
+        if isinstance(self.weights, Prior):
+            return self.weights
+        return adapt(Prior.load(self.weights, device=self.device), self.adapters)
+
+    @cached_property
+    def block(self) -> PairBlock:
+        """What makes two people of one prior."""
+        found = self.pair_weights
+        return found if isinstance(found, PairBlock) else PairBlock.load(found, self.prior)
+
+    @cached_property
+    def predictor(self) -> Predictor:
+        """What says what comes next."""
+        found = self.predictor_weights
+        return found if isinstance(found, Predictor) else Predictor.load(found, device=self.device)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Plan:
+    """What is asked of a task, with all that the request names."""
+
+    task: str
+    values: Any
+    """The task's request."""
+    sampling: Any
+    """The request's `Sampling`, with what its timeline says."""
+    seconds: float = 0.0
+    """Length of a duet where no timeline and no motion says it."""
+    timeline: Timeline | None = None
+    start: Motion | None = None
+    """What the timeline goes on from."""
+    goals: tuple[Goal | None, Goal | None] = (None, None)
+    """In the world: of one person, or of the first and the second."""
+    adapters: control.Adapters = "none"
+    """Networks that see the goals."""
+    people: tuple[Motion, ...] = ()
+    """The motion that is changed, gone on from or answered; all who are in it."""
+    target: Motion | None = None
+    """What is switched to, on the skeleton and at the rate of the first of them."""
+    hold: FixedJoints | None = None
+
+    @property
+    def count(self) -> int:
+        """Motions to make."""
+        return self.sampling.number()
+
+    @property
+    def prompt(self) -> str:
+        """What is said."""
+        return getattr(self.values, "prompt", None) or ""
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One motion of a task."""
+
+    people: tuple[Motion, ...]
+    number: int = 0
+    seed: int = 0
+    measures: dict[str, Any] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    """What was missed, a sentence each."""
+    about: Any = None
+    """What the task says besides: `Worded` or `Controlled`."""
+
+
+def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) -> Iterator[Result]:
+    """The motions of a plan as they are finished, loops closed; progress: network calls, or windows, done and in all.
+
+    Raises MotionloomError for what cannot be asked, as the functions of the tasks do.
+    """
+    task, size = (_composed, plan.count) if at_once(plan) else _TASKS[plan.task]
+    size = 1 if plan.timeline is not None and plan.task == "duet" else size
+    own, first = plan.task in ("predict", "switch", "duet"), plan.sampling.first
+    for begin in range(0, plan.count, size):
+        some = min(size, plan.count - begin)
+        group = replace(plan, sampling=replace(plan.sampling, first=first + begin, count=some))
+        moved = _Moved(progress, begin, some, plan.count)
+        for number, result in enumerate(task(group, models, moved), start=first + begin):
+            seed = plan.sampling.seed + (0 if own else number)
+            yield closed(plan, models, replace(result, number=number, seed=seed))
+
+
+def at_once(plan: Any) -> bool:
+    """Whether the motions of a plan are sampled in the same network calls, rather than one after the other."""
+    return plan.task != "duet" and plan.timeline is not None and not plan.timeline.readings
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """Reports how far the whole is by how far a group is."""
+
+    progress: Progress
+    begin: int
+    some: int
+    count: int
+
+    def __call__(self, done: int, of: int) -> None:
+        self.progress(self.begin * of + self.some * done, self.count * of)
+
+
+def closed(plan: Any, models: Models, result: Result) -> Result:
+    """The motion as a loop, where the request says so; an edit makes its own."""
+    values = plan.values
+    if plan.task == "edit" or not getattr(values, "loop", False):
+        return result
+    said = plan.timeline.segments[-1].text if plan.timeline else plan.prompt
+    said = "" if plan.task == "duet" else said
+    settings: dict[str, Any] = {"guidance": plan.sampling.guidance} if said else {}
+    settings |= {} if plan.task in ("predict", "switch") else {"steps": plan.sampling.steps}
+    how = {"blend": values.blend, "foot_lock": values.foot_lock, "seed": plan.sampling.seed + result.number}
+    with watching(lambda denoised: None):  # what is watched are the motions
+        people = tuple(edit.close(models.prior, one, said, **how, **settings) for one in result.people)
+    return replace(result, people=people)
+
+
+def moves(progress: Progress, steps: int, rows: int) -> Moves:
+    """What a chain of ``rows`` says of its moves, as progress."""
+    done = 0
+
+    def moved(more: int) -> None:
+        nonlocal done
+        done += more
+        progress(done, rows * steps)
+
+    return moved
+
+
+# Each task: results of a group, without their numbers and seeds
+
+
+def _composed(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+    assert plan.timeline is not None
+    segments = long.with_loaded(models.prior, plan.timeline.segments)
+    made = long.compose_takes(
+        models.prior,
+        segments,
+        start=plan.start,
+        path=plan.timeline.path,
+        foot_lock=plan.values.foot_lock,
+        sampling=plan.sampling,
+        progress=moves(progress, plan.sampling.steps, plan.count * len(segments)),
+    )
+    return (Result((motion,)) for motion in made)
+
+
+def _worded(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+    assert plan.timeline is not None
+    asked, lock = [plan.timeline] * plan.count, plan.values.foot_lock
+    for one in worded.draw(models.prior, asked, foot_lock=lock, sampling=plan.sampling, progress=progress):
+        measures = {"amounts": [asdict(amount) for amount in one.amounts]}
+        yield Result((one.motion,), measures=measures, remarks=one.shortfalls, about=one)
+
+
+def _controlled(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+    goal, _ = plan.goals
+    assert goal is not None
+    made = control.control(
+        models.prior,
+        plan.prompt,
+        goal,
+        adapters=plan.adapters,
+        fit=plan.values.fit,
+        foot_lock=plan.values.foot_lock,
+        sampling=plan.sampling,
+        progress=progress,
+    )
+    for one in made:
+        missed = list(one.missed)
+        yield Result((one.motion,), measures={"missed": missed}, remarks=missed, about=one)
+
+
+def _edited(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+    values, people = plan.values, list(plan.people)
+    names = ("keep", "between", "loop", "blend", "extend", "strength")
+    changes = edit.changes_asked(plan.prompt, **{name: getattr(values, name) for name in names})
+    own = people[values.person]
+    how = {"foot_lock": values.foot_lock, "sampling": plan.sampling, "progress": progress}
+    for motion in edit.edit(models.prior, own, plan.prompt, changes, **how):
+        people[values.person] = motion
+        yield Result(tuple(people) if len(motion) == len(own) else (motion,))
+
+
+def _predicted(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
+    made = predict.predict(
+        models.predictor,
+        plan.people[0],
+        seconds=plan.values.seconds,
+        hold=plan.hold,
+        root=plan.values.root,
+        foot_lock=plan.values.foot_lock,
+        sampling=plan.sampling,
+        progress=progress,
+    )
+    return [Result((motion,)) for motion in made]
+
+
+def _switched(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
+    assert plan.target is not None
+    made = predict.switch(
+        models.predictor,
+        plan.people[0],
+        plan.target,
+        seconds=plan.values.seconds,
+        facing=plan.values.facing,
+        foot_lock=plan.values.foot_lock,
+        sampling=plan.sampling,
+    )
+    return [Result((motion,)) for motion in made]
+
+
+def _duet(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
+    values, prior, block = plan.values, models.prior, models.block
+    how: dict[str, Any] = {"sampling": plan.sampling, "foot_lock": values.foot_lock}
+    if plan.timeline is not None:
+        segments = long.with_loaded(prior, plan.timeline.segments)
+        moved = moves(progress, plan.sampling.steps, len(segments))
+        path, person = plan.timeline.path, values.person
+        blocks = duet.compose_pair(prior, block, segments, path=path, person=person, progress=moved, **how)
+        made = [tuple(concatenated(*one) for one in zip(*blocks, strict=True))]
+    elif len(plan.people) == 2:
+        first, second = plan.people
+        made = pair.complete_pair(
+            prior, block, (first, second), plan.prompt, seconds=plan.seconds, progress=progress, **how
+        )
+    elif plan.people:
+        made = duet.react(prior, block, plan.people[0], plan.prompt, progress=progress, **how)
+    else:
+        made = pair.generate_pair(
+            prior, block, plan.prompt, seconds=plan.seconds, goals=plan.goals, progress=progress, **how
+        )
+    return [Result(tuple(two)) for two in made]
+
+
+_Task = Callable[[Plan, Models, Progress], Iterable[Result]]
+ALL = 10_000
+_TASKS: dict[str, tuple[_Task, int]] = {
+    "generate": (_worded, ALL),
+    "control": (_controlled, BATCH),
+    "edit": (_edited, 1),
+    "predict": (_predicted, 16),
+    "switch": (_switched, 16),
+    "duet": (_duet, pair.PAIRS),
+}
+"""What makes the motions of each, and how many of them are made together."""
