@@ -289,7 +289,8 @@ def sample_chain(
     def best_seed(row: R, seeds: list[int]) -> int:
         if len(seeds) == 1:
             return seeds[0]
-        noise, several, states = row_noise(seeds), [row.alone() for _ in seeds], np.empty(0)
+        noise, several = row_noise(seeds), [row.alone() for _ in seeds]
+        states: list[State] = []
         walk = denoising(
             lambda states, level: np.stack(denoise(several, list(states), [level] * len(seeds))),
             noise(np.empty((len(seeds), row.length, features), np.float32)),
@@ -299,7 +300,7 @@ def sample_chain(
             noise=noise,
         )
         for snapshot in walk:
-            states = snapshot.clean
+            states = list(snapshot.clean)
             moved(0)
         motions = np.stack([row.motions(state) for state in states])
         return seeds[best(prior, row.texts, motions, seeds=seeds, level=way[0])]
