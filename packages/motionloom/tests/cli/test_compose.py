@@ -78,6 +78,7 @@ def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, aske
     assert compose(weights, "three.yaml", "--out", "a.npz", "--json") == 0
     assert (asked["seed"], asked["guidance"], len(io.load("a.npz"))) == (4, 3, 160)
     about = json.loads(capsys.readouterr().out)
+    assert [one["sentence"] for one in about.pop("happened")] == ["moves 7.9 m forward"]
     assert about == {
         "seconds": 8.0,
         "of": 8.0,
