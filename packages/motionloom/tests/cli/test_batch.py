@@ -155,7 +155,9 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
 def test_a_column_that_is_none_is_reported_before_the_work(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     written(Path("jobs.jsonl"), [{"prompt": "a", "sead": 3}])
     assert command(weights, "jobs.jsonl") == 2
-    assert "the row has no 'sead' (did you mean 'seed'?); it has task, " in complaint(capsys)
+    said = complaint(capsys)
+    assert "the row has no 'sead' (did you mean 'seed'?); it has robot, " in said
+    assert " task, prompt, seconds, seed, " in said
     assert not Path("out").exists()
 
 

@@ -40,7 +40,10 @@ class Say(Checked):
     """What is done from now on; an empty text leaves the words to the steering."""
 
     text: str = declare(
-        "text", "what is done from now on; an empty text leaves the words to the steering", "", high=LONGEST_TEXT
+        "text",
+        "what is done from now on; an empty text leaves the words to the steering",
+        needed=True,
+        high=LONGEST_TEXT,
     )
 
     def __post_init__(self) -> None:
