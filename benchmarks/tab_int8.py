@@ -47,7 +47,7 @@ def main() -> None:
         save_prior(replace(prior, net=replace(prior.net, weights=EXPORT["rounded"](prior))), small, half=False)
     for way, file in (("as they ship", exact), ("in eight bits", small)):
         print(f"{way}: {in_a_sentence(totals(file, said.seeds, said.out / f'{mark}_{file.stem}'))}.", flush=True)
-    print(f"\n{said.seeds} seeds per prompt. Weights: {name} {mark}")
+    print(f"{said.seeds} seeds per prompt.\n\nWeights: {name} {mark}")
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ BUDGETS = {
     "viz": 2_355,
     "kinematics": 2_331,
     "edits": 2_268,
-    "runtime": 2_023,
+    "runtime": 2_035,
     "lab/evaluator": 1_522,
     "(top)": 1_461,
     "lab/report": 1_322,

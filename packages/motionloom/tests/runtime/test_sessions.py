@@ -1,6 +1,7 @@
 """Sessions of the shipped weights: a row's answer is its own, bit for bit, whatever is computed beside it."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -48,6 +49,19 @@ def test_rows_have_the_same_bits_alone_and_together(prior: Prior) -> None:
         np.testing.assert_array_equal(own.keys, bound.keys[[row], :, :, : own.keys.shape[3]])
         alone = prior.net(x[[row]], int(levels[row]), own)
         np.testing.assert_array_equal(alone, together[[row]])
+
+
+def test_threads_that_run_one_session_do_not_mix_their_answers(prior: Prior) -> None:
+    """As two live sessions of a server do. With buffers in common answers were mixed up, or there was a crash."""
+    bounds = [prior.net.bind(prior.condition([prompt])) for prompt in PROMPTS[:3]]
+    states = [noise(1, FRAMES + 8 * row, 263) for row in range(3)]
+    alone = [prior.net(x, 500, bound) for x, bound in zip(states, bounds, strict=True)]
+
+    def often(row: int) -> bool:
+        return all(np.array_equal(prior.net(states[row], 500, bounds[row]), alone[row]) for _ in range(40))
+
+    with ThreadPoolExecutor(3) as threads:
+        assert all(threads.map(often, range(3)))
 
 
 def test_padding_changes_no_bit(prior: Prior) -> None:

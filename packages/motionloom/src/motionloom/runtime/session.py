@@ -5,6 +5,7 @@ stay where they are, and the buffers of its answers are kept from call to call.
 """
 
 import os
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -71,6 +72,7 @@ class Session:
         self.device, self.threads, self._seldom = device, threads(), seldom
         self._graph, self._weights = graph, weights
         self._made: _Made | None = None
+        self._making = threading.Lock()
 
     def on(self, device: str) -> "Session":
         """The same on another device."""
@@ -81,15 +83,17 @@ class Session:
 
         feeds: an array for each input; what the graph does not ask for is left.
         held: names of those that never change once they were given, which are not brought to the device again.
+        Several threads may run one session at the same time.
         Raises MotionloomError where the graph cannot be run.
         """
-        if self._made is None:
-            self._made = _Made(self._graph, self._weights(), self.device, self.threads, seldom=self._seldom)
+        with self._making:
+            if self._made is None:
+                self._made = _Made(self._graph, self._weights(), self.device, self.threads, seldom=self._seldom)
         return self._made.run(feeds, held)
 
 
 class _Made:
-    """A session of ONNX Runtime with its buffers."""
+    """A session of ONNX Runtime, with buffers for each thread that runs it."""
 
     def __init__(
         self, graph: bytes, weights: Mapping[str, np.ndarray], device: str, count: int, *, seldom: bool
@@ -113,28 +117,31 @@ class _Made:
             self._session = onnxruntime.InferenceSession(graph, options, providers=[provider])
         except Exception as error:
             raise _refused(error) from None
-        self._io = self._session.io_binding()
         self._inputs, self._outputs = names.inputs, names.outputs
-        self._held: dict[str, tuple[np.ndarray, Any]] = {}
+        self._own = threading.local()
 
     def run(self, feeds: Mapping[str, np.ndarray], held: Sequence[str]) -> list[np.ndarray]:
         try:
+            if not hasattr(self._own, "io"):
+                self._own.io, self._own.held = self._session.io_binding(), {}
+            io = self._own.io
             for name in self._inputs:
-                self._io.bind_ortvalue_input(name, self._brought(name, feeds[name], name in held))
+                io.bind_ortvalue_input(name, self._brought(name, feeds[name], name in held))
             for name in self._outputs:
-                self._io.bind_output(name, "cpu")
-            self._session.run_with_iobinding(self._io)
-            return self._io.copy_outputs_to_cpu()
+                io.bind_output(name, "cpu")
+            self._session.run_with_iobinding(io)
+            return io.copy_outputs_to_cpu()
         except Exception as error:
             raise _refused(error) from None
 
     def _brought(self, name: str, array: np.ndarray, held: bool) -> Any:
         """The array as a value on the session's device."""
-        if held and name in self._held and self._held[name][0] is array:
-            return self._held[name][1]
+        kept: dict[str, tuple[np.ndarray, Any]] = self._own.held
+        if held and name in kept and kept[name][0] is array:
+            return kept[name][1]
         value = self._ort.OrtValue.ortvalue_from_numpy(np.ascontiguousarray(array), self._device, self._number)
         if held:
-            self._held[name] = array, value
+            kept[name] = array, value
         return value
 
 

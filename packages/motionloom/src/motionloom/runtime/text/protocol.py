@@ -1,5 +1,6 @@
 """What every text encoder gives, and the cache they share."""
 
+import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -81,23 +82,27 @@ def stack_rows(rows: Sequence[Row], width: int) -> TextEmbedding:
 
 
 class RowCache:
-    """Least-recently-used cache from text to encoded row."""
+    """Least-recently-used cache from text to encoded row, for several threads."""
 
     def __init__(self, size: int = 1024) -> None:
         self.size = size
         self._rows: OrderedDict[str, Row] = OrderedDict()
+        self._lock = threading.Lock()
 
     def __len__(self) -> int:
         return len(self._rows)
 
     def fetch(self, texts: Sequence[str], encode: Callable[[list[str]], list[Row]]) -> list[Row]:
         """The rows of all texts; `encode` is called once, with the distinct texts not seen lately."""
-        missing = [text for text in dict.fromkeys(texts) if text not in self._rows]
-        fresh = dict(zip(missing, encode(missing))) if missing else {}
-        rows = [fresh[text] if text in fresh else self._rows[text] for text in texts]
-        for text, row in zip(texts, rows):
-            self._rows[text] = row
-            self._rows.move_to_end(text)
-        while len(self._rows) > self.size:
-            self._rows.popitem(last=False)
+        with self._lock:
+            found = {text: self._rows.get(text) for text in texts}
+        missing = [text for text, row in found.items() if row is None]
+        found |= dict(zip(missing, encode(missing))) if missing else {}
+        rows = [row for text in texts if (row := found[text]) is not None]
+        with self._lock:
+            for text, row in zip(texts, rows):
+                self._rows[text] = row
+                self._rows.move_to_end(text)
+            while len(self._rows) > self.size:
+                self._rows.popitem(last=False)
         return rows
