@@ -117,8 +117,13 @@ class Studio:
     def at(self, name: str) -> tuple[float, float]:
         """Where a handle of the stage is on the screen: `path-end`, `facing` or `gizmo`."""
         self.page.wait_for_selector(f"#canvas[data-{name}]")
-        self.page.wait_for_timeout(300)  # the camera comes to rest
-        x, y = str(self.page.locator("#canvas").get_attribute(f"data-{name}")).split(",")
+        seen = ""
+        for _ in range(40):  # until the camera has come to rest, which a busy machine takes its time for
+            self.page.wait_for_timeout(300)
+            before, seen = seen, str(self.page.locator("#canvas").get_attribute(f"data-{name}"))
+            if seen == before:
+                break
+        x, y = seen.split(",")
         return float(x), float(y)
 
     def drop(self, *files: Path) -> None:
