@@ -10,8 +10,8 @@ import math
 import os
 import time
 import warnings
-from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
 from motionloom.io.text import plain_json
 from motionloom.weights.prior import read_tensors
+from motionloom_train.captured import Captured
 from motionloom_train.objectives import Objective
 from motionloom_train.precision import choose
 from motionloom_train.recipe import Recipe
@@ -204,13 +205,16 @@ def train(
     wrap: Callable[[nn.Module], nn.Module] = lambda net: net,
     on_save: Callable[[nn.Module, Average, int], None] | None = None,
     on_step: Callable[[int, float, float], None] | None = None,
+    capture: bool = False,
     stop: int | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Average:
     """Run a recipe in ``folder``, going on from the state found there; returns the averaged weights.
 
     ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(net, average,
-    step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``stop``: end early after so many steps.
+    step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``capture``: launch whole steps as graphs
+    (`motionloom_train.captured`), in one process on a CUDA device, of an objective that allows it. ``stop``: end early
+    after so many steps.
     ``say`` is called with the number format if the recipe leaves that open, and after the first steps with how long
     the run will take. A run that goes on multiplies in what it did, unless the recipe says otherwise.
     """
@@ -231,9 +235,14 @@ def train(
         on_save(net, average, done)
     pace = Pace(done, last, say)
     losses: list[Tensor] = []
+    seed, context = recipe.seed * 1_000_003 + world.rank, _context(recipe, world)
+    whole = Captured(objective, called, optimizer, clip=recipe.clip, context=context) if capture else None  # type: ignore[arg-type]
     began = time.perf_counter()
     for step in range(done, last):
-        losses.append(_step(objective, called, optimizer, recipe, step=step, world=world))
+        if whole:
+            losses.append(whole.step(seed, step, recipe.batch, rate_at(recipe, step)))
+        else:
+            losses.append(_step(objective, called, optimizer, recipe, seed=seed, step=step, context=context))
         average.update(net, step)
         saves = (step + 1) % recipe.save_every == 0 or step + 1 == last
         if len(losses) < (BEHIND if world.device.startswith("cuda") else 1) and not saves:
@@ -319,24 +328,42 @@ def _span(seconds: float) -> str:
 
 
 def _step(
-    objective: Objective, net: nn.Module, optimizer: torch.optim.Optimizer, recipe: Recipe, *, step: int, world: World
+    objective: Objective,
+    net: nn.Module,
+    optimizer: torch.optim.Optimizer,
+    recipe: Recipe,
+    *,
+    seed: int,
+    step: int,
+    context: Callable[[], AbstractContextManager[object]],
 ) -> Tensor:
     for group in optimizer.param_groups:
         group["lr"] = rate_at(recipe, step)
-    seed = recipe.seed * 1_000_003 + world.rank
     torch.manual_seed(seed * 7919 + step)  # dropout
-    kind = world.device.split(":")[0]
-    # on a CPU the plain attention is faster backward than the fused kernel for sequences this short (benchmarks/)
-    with (
-        torch.autocast(kind, torch.bfloat16) if recipe.amp == "bf16" else nullcontext(),
-        sdpa_kernel(SDPBackend.MATH) if kind == "cpu" else nullcontext(),
-    ):
+    with context():
         loss = objective.loss(net, seed, step, recipe.batch)
     optimizer.zero_grad(set_to_none=True)
     loss.backward()
     nn.utils.clip_grad_norm_(net.parameters(), recipe.clip)
     optimizer.step()
     return loss.detach()
+
+
+def _context(recipe: Recipe, world: World) -> Callable[[], AbstractContextManager[object]]:
+    """What the forward pass is computed in."""
+
+    @contextmanager
+    def entered() -> Iterator[None]:
+        kind = world.device.split(":")[0]
+        # on a CPU the plain attention is faster backward than the fused kernel for sequences this short (benchmarks/)
+        with (
+            # a graph keeps no rounded copies of the weights from one launch to the next
+            torch.autocast(kind, torch.bfloat16, cache_enabled=False) if recipe.amp == "bf16" else nullcontext(),
+            sdpa_kernel(SDPBackend.MATH) if kind == "cpu" else nullcontext(),
+        ):
+            yield
+
+    return entered
 
 
 class Log:

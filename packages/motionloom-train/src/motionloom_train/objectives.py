@@ -14,7 +14,7 @@ from motionloom.runtime.text.protocol import TextEncoder
 from motionloom_train.data.batches import Batch, Batches
 from motionloom_train.low_rank import AdapterNet
 from motionloom_train.nets.prior import Condition, PriorNet, condition
-from motionloom_train.tensors import noised, tensor
+from motionloom_train.tensors import tensor
 
 WEIGHTS = {
     "yaw_velocity": 6.0,
@@ -64,20 +64,22 @@ class WordBank:
                 count = min(int(mask.sum()), room)
                 tokens.append(row[:count].astype(np.float16))
                 starts.append(starts[-1] + count)
-        self.starts = torch.tensor(starts)
+        self.starts = torch.tensor(starts, device=device)
+        self.most = int(np.diff(starts).max())
         self.tokens, self.pooled = tensor(np.concatenate(tokens), device), tensor(np.concatenate(pooled), device)
 
     def condition(self, texts: Tensor, lengths: Tensor) -> Condition:
-        """The condition of a batch: numbers of sentences (rows,) and valid frames (rows,), both on the CPU."""
+        """The condition of a batch: numbers of sentences (rows,) and valid frames (rows,)."""
         device = self.tokens.device
+        texts, lengths = texts.to(device), lengths.to(device)
         first, counts = self.starts[texts], self.starts[texts + 1] - self.starts[texts]
         # a GPU computes in few shapes: its kernels and graphs are made for each
-        most = int(counts.max()) if device.type == "cpu" else int((self.starts[1:] - self.starts[:-1]).max())
-        place = torch.arange(most)
-        words = (place < counts[:, None]).to(device)
-        taken = (first[:, None] + place).clamp(max=len(self.tokens) - 1).to(device)
+        most = int(counts.max()) if device.type == "cpu" else self.most
+        place = torch.arange(most, device=device)
+        words = place < counts[:, None]
+        taken = (first[:, None] + place).clamp(max=len(self.tokens) - 1)
         tokens = self.tokens[taken].float() * words[..., None]
-        return condition(self.pooled[texts.to(device)], tokens=tokens, words=words, lengths=lengths)
+        return condition(self.pooled[texts], tokens=tokens, words=words, lengths=lengths)
 
 
 class Drawn(NamedTuple):
@@ -118,29 +120,43 @@ class CleanError:
         self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
         self.scale = feature_scale(weights, heights).to(device)
-        self.cost: Callable[[Tensor, Drawn], Tensor] = self.error
-
-    def compile(self) -> None:
-        """Compute `error` by compiled code."""
-        self.cost = torch.compile(self.error, dynamic=True)
+        self._signal, self._spread = (tensor(table, device).float() for table in (schedule.signal, schedule.noise))
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`."""
-        drawn = self.drawn(seed, step, rows)
-        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise)
-        return self.cost(net(state, drawn.level, drawn.cond), drawn)
+        window, picked = self.pick(seed, step, rows)
+        return self.shown_loss(net, window, picked.to(self.device), self._generator(seed, step))
+
+    def pick(self, seed: int, step: int, rows: int) -> tuple[int, Tensor]:
+        """See `motionloom_train.captured.Capturable`."""
+        return self.batches.pick(seed, step, rows)
+
+    def shown_loss(self, net: nn.Module, shape: int, picked: Tensor, generator: torch.Generator) -> Tensor:
+        """See `motionloom_train.captured.Capturable`."""
+        drawn = self._noised(shape, picked, generator)
+        at = drawn.level[:, None, None]
+        state = self._signal[at] * drawn.clean + self._spread[at] * drawn.noise
+        return self.error(net(state, drawn.level, drawn.cond), drawn)
+
+    def number(self, seed: int, step: int) -> int:
+        """See `motionloom_train.captured.Capturable`."""
+        return int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0])
 
     def drawn(self, seed: int, step: int, rows: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
-        batch: Batch = self.batches.draw(seed, step, rows)
-        number = int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0])
-        generator = torch.Generator(self.device).manual_seed(number)
+        window, picked = self.pick(seed, step, rows)
+        return self._noised(window, picked.to(self.device), self._generator(seed, step))
+
+    def _generator(self, seed: int, step: int) -> torch.Generator:
+        return torch.Generator(self.device).manual_seed(self.number(seed, step))
+
+    def _noised(self, window: int, picked: Tensor, generator: torch.Generator) -> Drawn:
+        batch: Batch = self.batches.show(window, picked)
+        rows = len(batch.lengths)
         level = self.drawn_levels(rows, generator)
         noise = torch.randn(batch.features.shape, generator=generator, device=self.device)
         keep = torch.rand(rows, generator=generator, device=self.device) >= self.drop_text
-        cond = self.words.condition(batch.texts, batch.lengths)
-        cond = Condition(*(part.to(self.device) for part in cond)).choose(keep)
-        return Drawn(batch.features.to(self.device), level, noise, cond)
+        return Drawn(batch.features, level, noise, self.words.condition(batch.texts, batch.lengths).choose(keep))
 
     def drawn_levels(self, rows: int, generator: torch.Generator) -> Tensor:
         """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
@@ -203,7 +219,8 @@ def displacement_error(denoised: Tensor, clean: Tensor, lengths: Tensor, mean: T
     error = ((displacements(denoised.float() * std + mean) - wanted) ** 2).sum(-1) / (3 * std[block].mean() ** 2)
     planted = clean[:, :-1, LAYOUT["contacts"]] * std[LAYOUT["contacts"]] + mean[LAYOUT["contacts"]] > 0.5
     weight = torch.ones_like(error)
-    weight[..., list(FEET)] += (PLANTED - 1) * planted
+    for place, foot in enumerate(FEET):  # a list of places would be copied to the GPU, which then waits
+        weight[..., foot] += (PLANTED - 1) * planted[..., place]
     valid = torch.arange(1, clean.shape[1], device=clean.device) < lengths[:, None]
     error = (error * weight).mean(-1)
     return ((error * valid).sum(1) / (lengths - 1).clamp(min=1)).mean()

@@ -85,17 +85,27 @@ def train_prior(
         if recipe.show_every and step % recipe.show_every == 0:
             _show(prior, recipe, folder / f"step_{step:07d}.png")
 
+    capture = recipe.compile and world.size == 1 and world.device.startswith("cuda")
+
     def wrap(module: nn.Module) -> nn.Module:
         assert isinstance(module, PriorNet)
         called: nn.Module = Conditioned(module)
-        if not recipe.compile:
-            return called
-        objective.compile()
-        # on a GPU every window has a shape of its own; on a CPU sentences have many lengths
-        return torch.compile(called, dynamic=not world.device.startswith("cuda"))  # type: ignore[return-value]
+        # sentences have many lengths
+        return torch.compile(called, dynamic=True) if recipe.compile and not capture else called  # type: ignore[return-value]
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop, say=say)
+    train(
+        objective,
+        recipe,
+        folder,
+        world=world,
+        wrap=wrap,
+        on_save=export,
+        on_step=log,
+        capture=capture,
+        stop=stop,
+        say=say,
+    )
     return place
 
 

@@ -51,7 +51,7 @@ class Recipe:
     amp: str = "auto"
     """What is multiplied in: ``bf16``, ``float32``, or whichever is quicker here; see `motionloom_train.precision`."""
     compile: bool = False
-    """Compile the network with torch.compile: pays on a GPU and on long runs."""
+    """Compile the network with torch.compile, on a CPU; launch whole steps of a prior as graphs, on a GPU."""
     displacement: float = 0.0
     """Weight of `objectives.displacement_error` in the loss; 0: the published loss alone."""
     early: float = 0.0

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from motionloom.kinematics import physics as ph
+from motionloom.kinematics.gestures import wrist_thrust
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.words import sentence
 
@@ -137,12 +138,18 @@ def turned_to(positions: Array) -> str:
 _LIMBS = {"hand": (20, 21), "foot": (7, 8)}
 
 
-def strike(positions: Array, fps: float, limb: str) -> tuple[tuple[int, int], str]:
+def strike(positions: Array, fps: float, limb: str, *, side: str = "") -> tuple[tuple[int, int], str]:
     """Frames (first, end) about the moment at which a hand (``foot``: ankle) is fastest against the body; its side.
 
-    ``positions`` (frames, 22, 3) metres. The side is empty where the other one is more than 0.6 times as fast.
+    ``positions`` (frames, 22, 3) metres. ``side``: the one that punches: the moment is that at which its fist shoots
+    forward. The side is empty where the other one is more than 0.6 times as fast.
     """
     speeds = np.linalg.norm(ph.velocity(ph.in_body(ph.smooth(positions, 3))[:, _LIMBS[limb]], fps), axis=-1)
+    if side:
+        thrusts = wrist_thrust(positions, fps)[:, ["left", "right"].index(side)]
+        if thrusts.max() > 0:
+            at = int(thrusts.argmax())
+            return (max(0, at - round(0.5 * fps)), min(len(positions), at + round(0.3 * fps) + 1)), side
     peaks = speeds.max(axis=0)
     one = int(peaks.argmax())
     at = int(speeds[:, one].argmax())

@@ -13,7 +13,7 @@ from motionloom_train.data import augment
 from motionloom_train.data.actions import ACTIONS, PREFIX, Action, sentences, side_of, turned_to
 from motionloom_train.data.clips import MADE, SHORTEST, THEN, Clip, Note
 from motionloom_train.data.idle import Idle
-from motionloom_train.data.made import GESTURES, hands_up, lower_arms, perform, words_for
+from motionloom_train.data.made import GESTURES, Gesture, hands_up, lower_arms, perform, words_for
 from motionloom_train.data.person import at_origin
 from motionloom_train.data.postures import Posture, assume, postures
 from motionloom_train.data.words import sentence
@@ -194,6 +194,8 @@ def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = 
         if made == count:
             return
         pair = [ACTIONS[names[i]] for i in rng.integers(len(names), size=2)]
+        if number % 6 == 0 and {"kick", "punch"} <= pool.keys():  # fighters do both; their guards agree
+            pair = [ACTIONS[name] for name in rng.permutation(["kick", "punch"])]
         if pair[0] is pair[1] or not all(action.says for action in pair):
             continue
         picked = [pool[action.name][rng.integers(len(pool[action.name]))] for action in pair]
@@ -246,40 +248,66 @@ def _core_positions(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
 
 
 def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
-    """Gestures of the arms (`data.made`) on people who stand, sit or walk; training clips of one licence."""
+    """Gestures of the arms (`data.made`) on people who stand, sit, walk or have just stopped walking; training clips of
+    one licence."""
     rng = np.random.default_rng(seed)
     bodies = _labelled(clips, ("stand", "walk", "sit"))
     bodies["walk"] = [(clip, note) for clip, note in bodies.get("walk", []) if note.last - note.first >= SHOWN]
-    leads = {"stand": "", "walk": "walks", "sit": "sits"}
+    bodies["stop"] = [(clip, note) for clip, note in _by_action(clips).get("stop walking", []) if note.core]
+    usual = [k for k in ("stand", "stand", "stand", "stand", "walk", "walk", "sit", "stop") if bodies.get(k)]
     for number in range(count if bodies.get("stand") else 0):
         gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
-        where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if bodies.get(k)]))
-        where = "stand" if gesture.times else where
+        where = str(rng.choice(usual))
+        where = "stand" if gesture.times else gesture.on if bodies.get(gesture.on) else where
         below, note = bodies[where][rng.integers(len(bodies[where]))]
-        frames = int(rng.integers(SHOWN, 160))
-        length = min(note.last - note.first, frames)
-        first = note.first + int(rng.integers(note.last - note.first - length + 1))
         side = str(rng.choice(["left", "right"]))
-        alive = idle.body(frames, rng) if where == "stand" else None
-        body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
-        body = at_origin(body if alive is None else alive)
-        if where == "stand" and alive is None and rng.random() < 0.7:
-            body = lower_arms(body)
-        begin = float(rng.uniform(0.8, 1.0))
-        needed = max(round(FPS * (begin + 1.5 * gesture.times)), 0 if where == "walk" else SHOWN)
-        if needed > len(body):
-            body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number, idle=idle)
+        body, begin = _gesturing(below, note, gesture, where, seed=seed * 100_003 + number, idle=idle, rng=rng)
         positions = perform(body, gesture, side, fps=FPS, begin=begin, rng=rng)
         features = hml.encode(positions, heading="corrected")
-        texts = words_for(gesture, side, leads[where], rng)
+        texts = words_for(gesture, side, "" if gesture.on == where else LEADS[where], rng)
+        if where == "stop":  # of the left hand only what names it, as in `data.sets`
+            texts = tuple(t for t in texts if gesture.hands == "both" or side == "right" or "left" in t)
         if texts:
-            group = PREFIX + MADE + gesture.name
             first = round(FPS * begin)
-            whole = (first, min(first + 30 * max(1, gesture.times), len(features)))
-            notes = (Note(0, len(features), group, texts, whole),)
+            end = min(first + 30 * max(1, gesture.times), len(features))
+            core, group = (first, end), PREFIX + MADE + gesture.name
+            if where == "stop":
+                core, group = (max(0, first - 25), end), PREFIX + MADE + STOPPED
+            notes = (Note(0, len(features), group, texts, core),)
             yield Clip(
                 f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
             )
+
+
+LEADS = {"stand": "", "walk": "walks", "sit": "sits", "stop": "walks up, stops"}
+"""What is said of the body before the gesture."""
+STOPPED = "behind a walk"
+"""The group of gestures of people who have just stopped."""
+
+
+def _gesturing(
+    below: Clip, note: Note, gesture: Gesture, where: str, *, seed: int, idle: Idle, rng: np.random.Generator
+) -> tuple[Array, float]:
+    """The body (frames, 22, 3) metres on which a gesture is made, and the second at which it begins."""
+    frames = int(rng.integers(SHOWN, 160))
+    length = min(note.last - note.first, frames)
+    first = note.first + int(rng.integers(note.last - note.first - length + 1))
+    begin = float(rng.uniform(0.8, 1.0))
+    if where == "stop":
+        assert note.core
+        first = max(note.first, note.core[1] - 70)
+        length = min(note.core[1] + 25, note.last) - first
+        begin = (note.core[1] - first) / FPS
+    alive = idle.body(frames, rng) if where == "stand" else None
+    body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
+    body = at_origin(body if alive is None else alive)
+    if where == "stand" and alive is None and rng.random() < 0.7:
+        body = lower_arms(body)
+    needed = max(round(FPS * (begin + 1.5 * gesture.times)), 0 if where == "walk" else SHOWN)
+    needed = max(needed, round(FPS * begin) + 60) if where == "stop" else needed
+    if needed > len(body):
+        body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed, idle=idle)
+    return body, begin
 
 
 def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:

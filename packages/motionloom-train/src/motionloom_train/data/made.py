@@ -39,6 +39,8 @@ class Gesture:
     """So often the hands go to the place and back; 0: once, and as often as not they stay."""
     thrust: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the hand of ``side`` strikes from the place, fast and once. The other hand stays at its place."""
+    on: str = ""
+    """What the body does meanwhile, where the words imply it: ``walk``."""
     hips: bool = False
     """The place is seen from the pelvis, not from between the shoulders."""
 

@@ -117,9 +117,10 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
         for note in clip.notes:
             said = _worded(note, texts, wordings, rng)
             moments = _moments(clip, note)
+            side = side_of([note.kind, *note.texts]) if "punch" in note.kind else ""
             for first, last in ((note.first, note.last), *moments):
                 core = note.core or ((first, last) if moments or _is_event(note) else None)
-                core, rests = _when(clip, note.kind, core, first, last)
+                core, rests = _when(clip, note.kind, core, first, last, side)
                 kept = (start + core[0], start + core[1]) if core else None
                 begins = tuple(start + rest for rest in rests)
                 items.append(
@@ -169,7 +170,7 @@ def _of_its_side(note: Note, said: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _when(
-    clip: Clip, kind: str, core: tuple[int, int] | None, first: int, last: int
+    clip: Clip, kind: str, core: tuple[int, int] | None, first: int, last: int, side: str
 ) -> tuple[tuple[int, int] | None, list[int]]:
     """The frames that a window must hold, drawn in to the strike where there is one; and where repetitions begin."""
     action = ACTIONS.get(kind.removeprefix(PREFIX)) if kind.startswith(PREFIX) else None
@@ -180,7 +181,7 @@ def _when(
     positions = hml.decode_positions(clip.features[first:last].astype(np.float64))
     if repeats:
         return None, [first + rest for rest in rests_of(positions, FPS)]
-    (begin, end), _ = strike(positions, FPS, limb)
+    (begin, end), _ = strike(positions, FPS, limb, side=side)
     return (first + begin, first + end), []
 
 
