@@ -259,6 +259,8 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
         gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
         where = str(rng.choice(usual))
         where = "stand" if gesture.times else gesture.on if bodies.get(gesture.on) else where
+        if where == "stop":  # what people walk up for
+            gesture = GESTURES[str(rng.choice(GREETINGS))]
         below, note = bodies[where][rng.integers(len(bodies[where]))]
         side = str(rng.choice(["left", "right"]))
         body, begin = _gesturing(below, note, gesture, where, seed=seed * 100_003 + number, idle=idle, rng=rng)
@@ -268,10 +270,12 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
         if where == "stop":  # of the left hand only what names it, as in `data.sets`
             texts = tuple(t for t in texts if gesture.hands == "both" or side == "right" or "left" in t)
         if texts:
-            first = round(FPS * begin)
+            first = max(0, round(FPS * begin))
             end = min(first + 30 * max(1, gesture.times), len(features))
             core, group = (first, end), PREFIX + MADE + gesture.name
-            if where == "stop":
+            if gesture.on == where:
+                core = (0, min(60, len(features)))
+            elif where == "stop":
                 core, group = (max(0, first - 25), end), PREFIX + MADE + STOPPED
             notes = (Note(0, len(features), group, texts, core),)
             yield Clip(
@@ -281,6 +285,7 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
 
 LEADS = {"stand": "", "walk": "walks", "sit": "sits", "stop": "walks up, stops"}
 """What is said of the body before the gesture."""
+GREETINGS = ("wave", "wave", "wave", "wave both", "point", "salute", "clap")
 STOPPED = "behind a walk"
 """The group of gestures of people who have just stopped."""
 
@@ -292,7 +297,7 @@ def _gesturing(
     frames = int(rng.integers(SHOWN, 160))
     length = min(note.last - note.first, frames)
     first = note.first + int(rng.integers(note.last - note.first - length + 1))
-    begin = float(rng.uniform(0.8, 1.0))
+    begin = -1.0 if gesture.on == where else float(rng.uniform(0.8, 1.0))
     if where == "stop":
         assert note.core
         first = max(note.first, note.core[1] - 70)

@@ -85,7 +85,7 @@ def _amount(gesture: Gesture, time: Array, rng: np.random.Generator) -> Array:
         period = rng.uniform(1.35, 1.5)
         moving = (time >= 0) & (time < gesture.times * period)
         return np.where(moving, _there_and_back(time % period, 0.65), 0.0)
-    end = time[-1] - rng.uniform(0.2, 0.8) if rng.random() < 0.5 else np.inf
+    end = time[-1] - rng.uniform(0.2, 0.8) if rng.random() < 0.5 and not gesture.on else np.inf
     return _there_and_back(time, end - _MOVE)
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionloom.kinematics import physics as ph
-from motionloom.kinematics.gestures import longest
+from motionloom.kinematics.gestures import longest, wrist_thrust
 from motionloom.kinematics.physics import Array
 
 Measures = dict[str, float]
@@ -65,6 +65,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
     leg = np.linalg.norm(p[:, _ANKLES] - p[:, _HIPS], axis=-1)
     level = np.abs(p[:, _WRISTS, 1] - p[:, _SHOULDERS, 1]) < 0.4
     thrust = np.where(level, ph.velocity(reach, fps), 0)
+    forward = wrist_thrust(p, fps).max(axis=0)
     raised = p[:, _WRISTS, 1] - p[:, 9:10, 1]
     lower = ph.smooth(p[:, [10, 11], 1].min(axis=1), ph.odd(fps / 2))
     fifth = max(1, len(p) // 5)
@@ -83,6 +84,8 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "punch_speed": float(thrust.max()),
         "left_punch": float(thrust[:, 0].max()),
         "right_punch": float(thrust[:, 1].max()),
+        "left_forward": float(forward[0]),
+        "right_forward": float(forward[1]),
         "both_over_head": float((p[:, _WRISTS, 1].min(axis=1) - p[:, 15, 1]).max()),
         "hand_over_neck": float((p[:, _WRISTS, 1] - p[:, 12:13, 1]).max()),
         "both_raised": float((raised.min(axis=1) > 0).mean()),
@@ -177,8 +180,8 @@ ALONE = (
 """The first of these is a window's only label."""
 
 GESTURES = (
-    Rule("punch,punch left", "left_punch > 1.4, right_punch < 0.9", (_PUNCH,), choice="punch"),
-    Rule("punch,punch right", "right_punch > 1.4, left_punch < 0.9", (_PUNCH,), choice="punch"),
+    Rule("punch,punch left", "left_punch > 1.4, left_forward > 1.1, right_punch < 0.9", (_PUNCH,), choice="punch"),
+    Rule("punch,punch right", "right_punch > 1.4, right_forward > 1.1, left_punch < 0.9", (_PUNCH,), choice="punch"),
     Rule("punch", "punch_speed > 1.4", (_PUNCH,), choice="punch"),
     Rule("kick ball", _KICKED, (_KICK, r"soccer|\bball\b"), choice="kick"),
     Rule("kick,kick left", f"{_KICKED}, left_kick > 0.5, right_kick < 0.25", (_KICK,), _ACROBAT, choice="kick"),
