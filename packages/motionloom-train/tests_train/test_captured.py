@@ -17,7 +17,7 @@ class Kept:
 
     recorded = 0
 
-    def __init__(self, work: Callable[[], Tensor]) -> None:
+    def __init__(self, work: Callable[[], Tensor], *, beside: "Kept | None") -> None:
         Kept.recorded += 1
         self.replay = work
 

@@ -8,7 +8,7 @@ from memory that is filled before each launch.
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import torch
 from torch import Tensor, nn
@@ -73,7 +73,8 @@ class Captured:
         graph = self._graphs[shape]
         if graph is None:
             self.optimizer.zero_grad(set_to_none=True)
-            graph = self._graphs[shape] = Graph(work)
+            beside = next((made for made in self._graphs.values() if made), None)
+            graph = self._graphs[shape] = Graph(work, beside=beside)
             generator.manual_seed(self.objective.number(seed, step))
         return graph.replay().clone()
 
@@ -88,15 +89,12 @@ class Captured:
 
 
 class Graph:
-    """A CUDA graph of some work; all graphs share one pool of memory, since they run one behind the other."""
+    """A CUDA graph of some work."""
 
-    _pool: Any = None
-
-    def __init__(self, work: Callable[[], Tensor]) -> None:
-        """Record ``work`` without running it."""
-        Graph._pool = Graph._pool or torch.cuda.graph_pool_handle()
+    def __init__(self, work: Callable[[], Tensor], *, beside: "Graph | None" = None) -> None:
+        """Record ``work`` without running it. ``beside``: a graph whose memory it shares; one runs at a time."""
         self._graph = torch.cuda.CUDAGraph()
-        with torch.cuda.graph(self._graph, pool=Graph._pool):
+        with torch.cuda.graph(self._graph, pool=beside._graph.pool() if beside else None):
             self._result = work()
 
     def replay(self) -> Tensor:

@@ -166,3 +166,15 @@ def test_a_strike_is_where_a_hand_is_fastest_and_names_the_side_that_does_it_alo
     assert side == {20: "left", 21: "right"}[hand]
     body[:, 41 - hand, 2] += 0.45 * pulse
     assert strike(body, 20.0, "hand")[1] == ""
+
+
+def test_a_punch_is_where_the_fist_of_its_side_goes_forward_not_where_a_hand_is_fastest() -> None:
+    body = people.walking(0.0, 5.0)
+    frames = np.arange(len(body))
+    body[:, [20, 21], 1] = body[:, 9:10, 1]  # fists at the chest
+    body[:, [20, 21], 2] = body[:, :1, 2] + 0.2
+    body[:, 21, 2] += 0.4 * np.exp(-(((frames - 60) / 2.5) ** 2))
+    body[:, 20, 1] -= 0.9 * np.exp(-(((frames - 20) / 2.5) ** 2))  # the other hand drops faster
+    (first, end), side = strike(body, 20.0, "hand", side="right")
+    assert (first < 58 < end, side) == (True, "right")
+    assert strike(body, 20.0, "hand")[0][0] < 20

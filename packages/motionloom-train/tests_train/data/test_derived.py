@@ -71,3 +71,30 @@ def test_gestures_go_on_for_four_seconds() -> None:
     made = list(made_clips([stands, walks], 60, seed=1))
     assert len(made) > 40
     assert min(len(one.features) for one in made) >= 79
+
+
+def test_who_has_walked_up_and_stopped_greets() -> None:
+    walks = people.walking(1.2, 3.0)
+    stops = np.concatenate([walks, np.repeat(walks[-1:], 40, axis=0)])
+    noted = clip(stops, Note(0, len(stops) - 1, "action:stop walking", ("he walks and stops",), (10, len(walks))))
+    made = list(made_clips([clip(people.standing(2.6), Note(0, 51, "stand")), noted], 200, seed=1))
+    behind = [one for one in made if one.notes[0].kind == "action:made behind a walk"]
+    assert behind
+    for one in behind:
+        p, (note,) = places(one), one.notes
+        assert p[0, 0, 2] < 0.1
+        assert p[-1, 0, 2] > 1.0
+        assert note.core
+        assert note.core[1] - note.core[0] >= 40
+        assert all("stop" in text for text in note.texts)
+
+
+def test_a_load_is_carried_from_the_first_frame_to_the_last() -> None:
+    walks = clip(people.walking(1.2, 5.0), Note(0, 99, "walk"))
+    made = list(made_clips([clip(people.standing(2.6), Note(0, 51, "stand")), walks], 200, seed=1))
+    carries = [one for one in made if one.notes[0].kind == "action:made carry"]
+    assert carries
+    for one in carries:
+        p = places(one)
+        assert p[-1, 0, 2] - p[0, 0, 2] > 2
+        assert (p[:, [20, 21], 2] - p[:, :1, 2] > 0.2).all()
