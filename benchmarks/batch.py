@@ -132,8 +132,7 @@ def pure(rows: int, steps: int, weights: str) -> None:
     """Draw and solve rows of 4 s in this process when a line comes in; say the seconds of it."""
     import torch
 
-    from motionloom.bulk.sampling import draw_group
-    from motionloom.tasks.text import finish, frames_in
+    from motionloom.tasks.text import finish, frames_in, sample_features
     from motionloom.weights.prior import Prior
 
     torch.set_num_threads(1)
@@ -142,7 +141,7 @@ def pure(rows: int, steps: int, weights: str) -> None:
 
     def make(seeds: range) -> None:
         prompts = [PROMPTS[seed % 4] for seed in seeds]
-        for features in draw_group(prior, prompts, [frames] * len(seeds), seeds=list(seeds), steps=steps):
+        for features in sample_features(prior, prompts, [frames] * len(seeds), seeds=list(seeds), steps=steps):
             finish(prior, features)
 
     make(range(CALL))
@@ -173,11 +172,12 @@ def profile(rows: int, steps: int, weights: str) -> None:
     """Print the processor seconds per motion of one process, by what it does."""
     import torch
 
-    from motionloom.bulk import maker as module
+    from motionloom.bulk import maker as bulk
     from motionloom.bulk.maker import Maker, Options
     from motionloom.bulk.row import parse
     from motionloom.bulk.shard import entry_of
     from motionloom.bulk.writers import writer
+    from motionloom.tasks import text
 
     torch.set_num_threads(1)
     spent: dict[str, float] = {}
@@ -196,7 +196,8 @@ def profile(rows: int, steps: int, weights: str) -> None:
     with tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
         lines = job(Path(folder) / "jobs.jsonl", rows, 4.0).read_bytes().splitlines()
         list(maker.make([maker.sources.ask(parse(lines[0]))]))  # the first call of a network is slower
-        for name, what in (("sampling", "draw_group"), ("body", "finish"), ("measures", "measure")):
+        parts = (("sampling", text, "sample_features"), ("body", text, "finish"), ("measures", bulk, "measure"))
+        for name, module, what in parts:
             setattr(module, what, timed(name, getattr(module, what)))
         files = {kind: writer(kind, Path(folder) / kind) for kind in ("npz", "bvh", "glb", "webdataset")}
         ask = timed("rows", lambda line: maker.sources.ask(parse(line)))

@@ -6,7 +6,6 @@ Usage: python benchmarks/read_words.py > benchmarks/read_words.txt
 import sys
 
 from motionloom.goals.amount_goal import kept, measured
-from motionloom.requests.sampling import Sampling
 from motionloom.tasks.text import generate
 from motionloom.tasks.worded import draw, read
 from motionloom.weights.prior import Prior, find_weights
@@ -47,7 +46,7 @@ def main() -> None:
         asked = read(prior, text)
         (reading,) = asked.readings
         amount = reading.amount
-        with_it = [next(iter(draw(prior, [asked], sampling=Sampling(seed=seed)))) for seed in SEEDS]
+        with_it = [next(iter(draw(prior, [asked], seeds=[seed]))) for seed in SEEDS]
         without = [generate(prior, text, seed=seed, literal=True)[0] for seed in SEEDS]
         alone = [measured(amount, motion.positions(), motion.fps) for motion in without]
         lines = [

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import load, save
-from motionloom.goals.hold import Hold
+from motionloom.goals.hold import FixedJoints
 from motionloom.goals.mask_file import read_mask
 from motionloom.tasks.predict import predict, switch
 from motionloom.viz.overlay import draw_futures
@@ -28,7 +28,7 @@ ends = np.array([motion.root[-1] for motion in futures])
 print(f"future_0.bvh to future_4.bvh, futures.png: they end up to {np.ptp(ends, axis=0).max():.2f} m from each other")
 assert same
 
-hold = Hold(later, read_mask(here / "masks" / "left_arm.json", fps=past.fps))
+hold = FixedJoints(later, read_mask(here / "masks" / "left_arm.json", fps=past.fps))
 [held] = predict(predictor, past, count=1, seconds=1.5, seed=1, hold=hold)
 save(held, "held.bvh")
 elbow = past.skeleton.index("left_elbow")

@@ -1,14 +1,8 @@
-"""Write what is made of requests: the types of the studio's page and the schema of timeline files."""
+"""Write what is made of requests: the types of the studio's page."""
 
-import json
 from pathlib import Path
 from typing import Any
 
-from motionloom.goals.adapters import MOST_ADAPTERS
-from motionloom.goals.timeline import MAX_SEGMENTS, SCHEMA
-from motionloom.requests.fields import specs
-from motionloom.requests.schema import schema
-from motionloom.requests.timeline import SegmentKeys, TimelineKeys
 from motionloom.server.components import components, request_of
 from motionloom.server.job_request import TASKS
 from motionloom.server.limits import Limits
@@ -62,35 +56,6 @@ def types() -> str:
     return "\n".join([HEAD, *(interface(name, found[name]) for name in names)])
 
 
-def timelines() -> str:
-    """The JSON Schema of timeline files; what goals hold stands in their own."""
-    word = {"type": "string", "minLength": 1}
-    kinds: dict[str, Any] = {
-        "segments": {"type": "array", "minItems": 1, "maxItems": MAX_SEGMENTS, "items": {"$ref": "#/$defs/segment"}},
-        "goal": {"anyOf": [{"type": "object"}, word]},
-        "motion file": word,
-        "adapters": {"anyOf": [word, {"type": "array", "minItems": 1, "maxItems": MOST_ADAPTERS, "items": word}]},
-    }
-    whole, part = (
-        {name: schema(one, kinds) for name, one in specs(keys).items()} for keys in (TimelineKeys, SegmentKeys)
-    )
-    segment = {"type": "object", "additionalProperties": False, "required": ["text"], "properties": part}
-    segment["not"] = {"required": ["goal", "goals"]}
-    found = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "urn:motionloom:timeline:1",
-        "title": "motionloom timeline",
-        "description": "What a person does, one segment after the other; read by motionloom compose",
-        "type": "object",
-        "additionalProperties": False,
-        "required": ["segments"],
-        "properties": whole,
-        "$defs": {"segment": {"anyOf": [part["text"], segment]}},
-    }
-    return json.dumps(found, indent=2) + "\n"
-
-
 if __name__ == "__main__":
-    for place, text in ((PLACE, types()), (SCHEMA, timelines())):
-        place.write_text(text, encoding="utf-8")
-        print(place)
+    PLACE.write_text(types(), encoding="utf-8")
+    print(PLACE)

@@ -1,8 +1,6 @@
 """A JSON Schema validator for the words that the project's schemas use, and no other."""
 
-import json
 import re
-from pathlib import Path
 from typing import Any
 
 TYPES: dict[str, Any] = {
@@ -43,9 +41,8 @@ KNOWN = {
 }
 
 
-def valid(file: Path, value: Any) -> bool:
-    """By the jsonschema library where it is installed, else by the little validator; ``file`` is the schema."""
-    schema = json.loads(file.read_text())
+def valid(schema: dict[str, Any], value: Any) -> bool:
+    """By the jsonschema library where it is installed, else by the little validator."""
     mine = fits(value, schema, schema)
     try:
         import jsonschema

@@ -26,6 +26,8 @@ export interface GenerateRequest {
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
   readonly solver?: Solver;
+  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -50,6 +52,8 @@ export interface ComposeRequest {
   readonly steps?: number;
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
+  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -82,6 +86,8 @@ export interface ControlRequest {
   readonly steps?: number;
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
+  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -118,6 +124,8 @@ export interface EditRequest {
   readonly steps?: number;
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
+  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -229,6 +237,8 @@ export interface DuetRequest {
   readonly pair_guidance?: number;
   /** keep bodies out of each other, and bring hands together that the words say meet */
   readonly bodies?: boolean;
+  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
   /** seconds drawn anew for a loop */
@@ -275,3 +285,9 @@ export type Goals = { readonly [key: string]: unknown };
 export type Solver = "ddpm" | "ddim" | "dpm2m" | "dpm2m-sde";
 
 export type Facing = "turned" | "kept";
+
+export type Root = "motion" | "hips" | "in-place";
+
+export type Hands = "relaxed" | "fist" | "flat" | "as-is";
+
+export type At = "character" | "origin";

@@ -18,6 +18,8 @@ from torch import Tensor, nn
 from motionloom.arrays import unit
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.requests.fields import declare, like
+from motionloom.requests.teach import Teach
 from motionloom.runtime.text.known import bare
 from motionloom.tasks.text import sample_features
 from motionloom.weights.adapter import TAUGHT, Adapter, origin
@@ -33,9 +35,6 @@ from motionloom_train.precision import CHOICES, choose
 from motionloom_train.recipe import Recipe
 from motionloom_train.tensors import find_device, noised, tensor
 
-RANK = 16
-STEPS, BATCH = 1300, 16
-RATE = 1e-3
 WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
 """Frames of the windows that a step sees, and how often."""
 DRAWS, DRAWN_FRAMES, DRAWN_STEPS = 96, 100, 12
@@ -45,8 +44,6 @@ OTHERS, FAR = 2000, 0.9
 is left and it is decided what will be shown, one of these is kept instead of the motion's own."""
 UNLIKE = 0.6
 """Cosine under which they must be to what is taught, so that other words for it may change as well."""
-KEEP = 0.5
-"""Share of the rows that show what the prior drew."""
 KEEP_WEIGHT = 2.0
 """How much their error counts."""
 SILENT = 0.25
@@ -69,30 +66,14 @@ _WHOLE = re.compile(r"(an?|the|he|she|they|my|our|his|her|some\w*|[a-z]+ing)\b")
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Lesson:
-    """How something is taught."""
+@dataclass(frozen=True, kw_only=True)
+class Lesson(Teach):
+    """How something is taught: what is asked, and how it is trained."""
 
-    name: str = "adapter"
-    licence: str = ""
-    """What one may do with the adapter; empty: what the owner of the clips and that of the prior allow."""
-    steps: int = STEPS
-    batch: int = BATCH
-    rank: int = RANK
-    rate: float = RATE
-    keep: float = KEEP
-    """Share of the rows, 0 to 0.9, on what the prior knows already."""
-    seed: int = 0
-    amp: str = "auto"
-    """What is multiplied in; see `motionloom_train.precision`."""
-
-    def __post_init__(self) -> None:
-        limits = (("steps", 1, 100_000), ("batch", 2, 1024), ("rank", 1, 128), ("rate", 1e-6, 0.1), ("keep", 0, 0.9))
-        for key, low, high in limits:
-            if not low <= getattr(self, key) <= high:
-                raise MotionloomError(f"{key} must be {low:g} to {high:g}; got {getattr(self, key)!r}")
-        if self.amp not in CHOICES:
-            raise MotionloomError(f"amp must be one of {', '.join(CHOICES)}; got {self.amp!r}")
+    name: str = like(Teach, "name", default="adapter")
+    amp: str = like(Teach, "amp", words=CHOICES)
+    batch: int = declare("whole", "rows of a step", 16, low=2, high=1024)
+    rate: float = declare("number", "learning rate", 1e-3, low=1e-6, high=0.1)
 
 
 def teach(

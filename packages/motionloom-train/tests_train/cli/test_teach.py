@@ -1,13 +1,17 @@
 """teach, as a stranger types it, on a tiny prior with random weights."""
 
+import argparse
 import json
 from pathlib import Path
 
 import pytest
 
 from motionloom import io
-from motionloom.cli import main
+from motionloom.cli import main, parser
+from motionloom.cli.options import option
 from motionloom.kinematics.ik import motion_from_positions
+from motionloom.requests.fields import specs
+from motionloom.requests.teach import Teach
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
 from motionloom_train import teach as module
@@ -39,6 +43,14 @@ def test_clips_become_an_adapter_with_a_card(knowing: str, capsys: pytest.Captur
     assert (adapter.name, adapter.licence, adapter.notes["clips"]) == ("z", "mine", 2)
     assert main(["weights", "z.safetensors"]) == 0
     assert "taught adapter" in capsys.readouterr().out
+
+
+def test_its_options_are_the_fields_of_its_request() -> None:
+    commands = next(one.choices for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
+    options = commands["teach"]._option_string_actions
+    for name, spec in specs(Teach).items():
+        assert spec.help in options[option(name, spec)].help
+        assert options[option(name, spec)].default == spec.default
 
 
 def test_check_says_what_is_wrong_and_writes_nothing(knowing: str, capsys: pytest.CaptureFixture[str]) -> None:

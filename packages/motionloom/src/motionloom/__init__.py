@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from motionloom.bulk.metadata import read_batch
     from motionloom.errors import MotionloomError
     from motionloom.goals.goal import Goal
-    from motionloom.goals.hold import FixedJoints, FixedPart, HeldPart, Hold
+    from motionloom.goals.hold import FixedJoints, FixedPart
     from motionloom.goals.segment import Segment
     from motionloom.io import load, save
     from motionloom.kinematics.deeds import Deeds, measure_deeds
@@ -72,8 +72,6 @@ _PLACES = {
     "Goal": "goals.goal",
     "FixedJoints": "goals.hold",
     "FixedPart": "goals.hold",
-    "HeldPart": "goals.hold",
-    "Hold": "goals.hold",
     "Segment": "goals.segment",
     "compose": "tasks.long",
     "complete_pair": "tasks.pair",
@@ -95,8 +93,6 @@ __all__ = [
     "FixedJoints",
     "FixedPart",
     "Goal",
-    "HeldPart",
-    "Hold",
     "Live",
     "LivePair",
     "Loop",

@@ -37,6 +37,8 @@ class Format:
     """The keyword by which the writer takes a word for each motion: ``names``, ``captions``, or none."""
     scene: str | Callable[..., Any] = ""
     """``(motions, path, caption) -> path`` for people of one world, where the writer would show them apart."""
+    character: str | Callable[..., Any] = ""
+    """``(path, joint_map=) -> Character`` of `motionloom.io.character`: a humanoid that is written with its motions."""
     needs: str | Callable[..., Any] = ""
     """Raises `MotionloomError` where a program that the writer needs is missing; asked before long work."""
 
@@ -50,6 +52,8 @@ def _gltf(suffix: str, **written: Any) -> Format:
     return Format(suffix, "motionloom.io.gltf:load_glb", ("clip",), clips=True, people=people, **written)
 
 
+_CHARACTER = "motionloom.io.character:load_character"
+
 FORMATS = {
     one.suffix: one
     for one in (
@@ -61,9 +65,9 @@ FORMATS = {
             single=True,
         ),
         Format(".amc", "motionloom.io.asf:load_amc", ("fps", "unit", "asf")),
-        _gltf(".glb", writer="motionloom.io.gltf:save_glb", labels="names"),
-        _gltf(".gltf"),
-        _gltf(".vrm"),
+        _gltf(".glb", character=_CHARACTER, writer="motionloom.io.gltf:save_glb", labels="names"),
+        _gltf(".gltf", character=_CHARACTER),
+        _gltf(".vrm", character=_CHARACTER),
         _gltf(".vrma", writer="motionloom.io.vrma:save_vrma", single=True),
         Format(".usda", writer="motionloom.io.usda:save_usda", labels="names"),
         Format(
@@ -73,6 +77,7 @@ FORMATS = {
             clips=True,
             writer="motionloom.io.fbx:save_fbx",
             labels="names",
+            character="motionloom.io.fbx:load_fbx_character",
             needs="motionloom.io.blender:find_blender",
         ),
         Format(
@@ -121,6 +126,11 @@ def readable() -> tuple[str, ...]:
 def writable(*, single: bool | None = None) -> tuple[str, ...]:
     """Suffixes of files that are written; ``single``: only those that hold one person, or only the others."""
     return tuple(suffix for suffix, one in FORMATS.items() if one.writer and single in (None, one.single))
+
+
+def characters(*, alone: bool = False) -> tuple[str, ...]:
+    """Suffixes of files of characters; ``alone``: only those that need no other program."""
+    return tuple(suffix for suffix, one in FORMATS.items() if one.character and not (alone and one.needs))
 
 
 def with_clips() -> tuple[str, ...]:

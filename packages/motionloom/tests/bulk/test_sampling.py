@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.bulk.sampling import draw_group, groups
+from motionloom.tasks.sampling import Rows
 from motionloom.tasks.text import generate, sample_features
 from motionloom.weights.prior import Prior, shipped
 from tests.recorded import tiny
@@ -20,8 +20,7 @@ PROMPTS = (
 
 @given(frames=st.lists(st.integers(4, 400), max_size=40), together=st.integers(1, 8))
 def test_every_row_is_in_one_group_of_rows_with_as_many_tokens(frames: list[int], together: int) -> None:
-    prior = tiny.prior()
-    found = groups(prior, frames, together)
+    found = Rows([""] * len(frames), frames, range(len(frames)), patch=4).batches(together)
     assert sorted(row for group in found for row in group) == list(range(len(frames)))
     for group in found:
         assert 1 <= len(group) <= together
@@ -29,7 +28,7 @@ def test_every_row_is_in_one_group_of_rows_with_as_many_tokens(frames: list[int]
 
 
 def drawn(prior: Prior, rows: list[int], lengths: list[int]) -> list[np.ndarray]:
-    return draw_group(prior, [PROMPTS[i] for i in rows], lengths, seeds=rows, steps=4)
+    return sample_features(prior, [PROMPTS[i] for i in rows], lengths, seeds=rows, padded=True, steps=4)
 
 
 @pytest.mark.parametrize("config", [tiny.MODULATED, tiny.PUBLISHED], ids=["modulated", "published"])

@@ -30,10 +30,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the command asked of the maker of motion, which walks 1 m a second along +Z and stops where it is told."""
     seen: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def compose(prior, segments, *, seed=0, guidance=2.5, steps=24, best_of, start, path, foot_lock, progress):
-        seen.update(
-            segments=segments, seed=seed, guidance=guidance, steps=steps, start=start, path=path, foot_lock=foot_lock
-        )
+    def compose(prior, segments, *, sampling, start, path, foot_lock, progress):
+        seen.update(segments=segments, start=start, path=path, foot_lock=foot_lock)
+        seen.update(seed=sampling.seed, guidance=sampling.guidance, steps=sampling.steps)
         at = 0
         for number, segment in enumerate(segments):
             if number == seen["stop"]:
@@ -42,7 +41,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
             root = np.zeros((frames, 3))
             root[:, 2] = np.arange(at, at + frames) / 20
             at += frames
-            progress(steps)
+            progress(sampling.steps)
             yield Motion(SMPL22, 20.0, root, np.tile(IDENTITY, (frames, 22, 1)))
 
     monkeypatch.setattr(long, "compose", compose, raising=False)
@@ -154,11 +153,6 @@ def test_check_reads_and_makes_nothing(weights, asked, capsys):
     assert json.loads(capsys.readouterr().out)["files"] == []
     assert written() == {"three.yaml"}
     assert "segments" not in asked
-
-
-def test_the_schema_is_printed_as_json(capsys):
-    assert main(["compose", "--schema"]) == 0
-    assert json.loads(capsys.readouterr().out)["properties"]["segments"]["items"] == {"$ref": "#/$defs/segment"}
 
 
 @pytest.mark.parametrize(

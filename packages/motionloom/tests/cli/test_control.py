@@ -8,7 +8,6 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
-from motionloom.goals.goal_file import SCHEMA
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
@@ -145,11 +144,6 @@ def test_a_motion_is_made_from_end_to_end(weights: str, capsys: pytest.CaptureFi
     motion = io.load("a.npz")
     assert motion.root[0, [0, 2]] == pytest.approx([1, 0], abs=0.05)
     assert "cm from its goals" in capsys.readouterr().out
-
-
-def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["control", "--schema"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(SCHEMA.read_text())
 
 
 @pytest.mark.parametrize(

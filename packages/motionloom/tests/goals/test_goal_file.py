@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from motionloom import io
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import Goal, start_of
-from motionloom.goals.goal_file import SCHEMA, follow, read_goal
+from motionloom.goals.goal_file import follow, read_goal
+from motionloom.goals.schemas import goal_schema
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
@@ -283,7 +284,7 @@ def test_a_large_file_and_a_link_outwards_are_not_read(folder: Path, tmp_path: P
 
 # The schema ------------------------------------------------------------------------------------------------------
 
-WHOLE = json.loads(SCHEMA.read_text())
+WHOLE = goal_schema()
 STRUCTURE = {  # mistakes that the schema can see; the others are about times, reach and files
     "paths",
     "nothing",

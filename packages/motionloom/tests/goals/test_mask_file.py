@@ -9,8 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.hold import HeldPart
-from motionloom.goals.mask_file import JOINTS, KEYS, PART_KEYS, SCHEMA, all_held, check_names, read_mask
+from motionloom.goals.hold import FixedPart
+from motionloom.goals.mask_file import all_held, check_names, read_mask
+from motionloom.goals.schemas import MASK_JOINTS as JOINTS
+from motionloom.goals.schemas import mask_schema
+from motionloom.requests.mask import MASK, PART
 from motionloom.skeleton import SMPL22
 from tests.schema_check import valid
 
@@ -42,11 +45,11 @@ def test_every_key_arrives_where_it_belongs(read, indent):
     inside = [k for k in range(50) if any(a <= (k + 1) / 40 <= b for a, b in found[1].spans)]
     assert inside == [*range(10), *range(20, 30)]  # frame 0 lies 1/40 s behind the end of the past
     assert found == (
-        HeldPart(("left_arm", "head"), ((0.0, 1.5),)),
-        HeldPart(("root",), found[1].spans),
-        HeldPart(("torso",), ((1.0, inf),)),
-        HeldPart(("feet",), ((0.0, 0.5),)),
-        HeldPart(("neck",), ((0.0, inf),)),
+        FixedPart(("left_arm", "head"), ((0.0, 1.5),)),
+        FixedPart(("root",), found[1].spans),
+        FixedPart(("torso",), ((1.0, inf),)),
+        FixedPart(("feet",), ((0.0, 0.5),)),
+        FixedPart(("neck",), ((0.0, inf),)),
     )
 
 
@@ -55,11 +58,11 @@ def test_neighbouring_stretches_of_frames_leave_no_gap_and_share_no_frame(read, 
     spans = read('{"hold": [{"joints": ["head"], "frames": [[0, 7], [7, 1000], [1000, 2000]]}]}', fps=fps)[0].spans
     counts = [sum(a <= (k + 1) / fps <= b for a, b in spans) for k in range(2100)]
     assert counts == [1] * 2000 + [0] * 100
-    assert all_held((HeldPart(SMPL22.names, spans),), 2000 / fps)
+    assert all_held((FixedPart(SMPL22.names, spans),), 2000 / fps)
 
 
 def test_yaml_says_the_same(read):
-    assert read("hold:\n- joints: [left_arm]\n  to: 2\n") == (HeldPart(("left_arm",), ((0.0, 2.0),)),)
+    assert read("hold:\n- joints: [left_arm]\n  to: 2\n") == (FixedPart(("left_arm",), ((0.0, 2.0),)),)
 
 
 REFUSED = [
@@ -75,9 +78,9 @@ REFUSED = [
     ('{"hold": [{"joints": "head"}]}', 1, "got 'head'"),
     ('{"hold": [{"joints": [\n"left_am"]}]}', 2, "is called 'left_am' (did you mean 'left_arm'?); there are root, "),
     ('{"hold": [{"joints": ["head",\n 3]}]}', 2, "a joint is named by a word; got the number 3"),
-    ('{"hold": [{"joints": ["head"],\n"from": -1}]}', 2, "'from' must be 0 to 86400 seconds; got -1"),
-    ('{"hold": [{"joints": ["head"],\n"to": "1"}]}', 2, "'to' must be a number of seconds; got '1'"),
-    ('{"hold": [{"joints": ["head"],\n"to": true}]}', 2, "got true or false"),
+    ('{"hold": [{"joints": ["head"],\n"from": -1}]}', 2, "'from' must be 0 to 86,400 seconds; got -1"),
+    ('{"hold": [{"joints": ["head"],\n"to": "1"}]}', 2, "'to' must be a number; got '1'"),
+    ('{"hold": [{"joints": ["head"],\n"to": true}]}', 2, "got true"),
     ('{"hold": [{"joints": ["head"],\n"to": NaN}]}', 2, "not a finite number"),
     ('{"hold": [{"joints": ["head"],\n"to": 86401}]}', 2, "got 86401"),
     ('{"hold": [{"joints": ["head"],\n"to": 0}]}', 2, "'to' must be after 'from', 0 s; got 0"),
@@ -124,14 +127,14 @@ def test_names_on_the_line_are_checked_the_same():
 @pytest.mark.parametrize(
     ("parts", "held"),
     [
-        ([HeldPart(("lower_body", "upper_body"))], True),
-        ([HeldPart(("lower_body",)), HeldPart(("upper_body",))], True),
-        ([HeldPart(("lower_body",)), HeldPart(("upper_body",), ((0.0, 1.0), (1.0, 2.0)))], True),
-        ([HeldPart(("lower_body",)), HeldPart(("upper_body",), ((0.0, 1.0), (1.1, 2.0)))], False),
-        ([HeldPart(("lower_body",)), HeldPart(("upper_body",), ((0.1, 2.0),))], False),
-        ([HeldPart(("lower_body",)), HeldPart(("upper_body",), ((0.0, 1.9),))], False),
-        ([HeldPart((*SMPL22.names[:-1], "root"))], False),
-        ([HeldPart(SMPL22.names)], True),
+        ([FixedPart(("lower_body", "upper_body"))], True),
+        ([FixedPart(("lower_body",)), FixedPart(("upper_body",))], True),
+        ([FixedPart(("lower_body",)), FixedPart(("upper_body",), ((0.0, 1.0), (1.0, 2.0)))], True),
+        ([FixedPart(("lower_body",)), FixedPart(("upper_body",), ((0.0, 1.0), (1.1, 2.0)))], False),
+        ([FixedPart(("lower_body",)), FixedPart(("upper_body",), ((0.1, 2.0),))], False),
+        ([FixedPart(("lower_body",)), FixedPart(("upper_body",), ((0.0, 1.9),))], False),
+        ([FixedPart((*SMPL22.names[:-1], "root"))], False),
+        ([FixedPart(SMPL22.names)], True),
         ([], False),
     ],
 )
@@ -143,16 +146,16 @@ def test_only_all_joints_all_of_the_time_leave_nothing_to_predict(parts, held):
 
 
 def test_the_schema_has_the_readers_keys_and_words():
-    schema = json.loads(SCHEMA.read_text())
-    assert tuple(schema["properties"]) == KEYS
-    assert tuple(schema["$defs"]["part"]["properties"]) == PART_KEYS
-    assert tuple(schema["$defs"]["joint"]["enum"]) == JOINTS
+    schema = mask_schema()
+    assert tuple(schema["properties"]) == tuple(MASK)
+    assert tuple(schema["properties"]["hold"]["items"]["properties"]) == tuple(PART)
+    assert schema["properties"]["hold"]["items"]["properties"]["joints"]["items"]["enum"] == list(JOINTS)
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
 def test_the_examples_are_read_and_fit(example):
     assert read_mask(example, fps=20)
-    assert valid(SCHEMA, json.loads(example.read_text()))
+    assert valid(mask_schema(), json.loads(example.read_text()))
 
 
 NUMBERS = st.sampled_from([0, 1, 2, 10, 0.5, 86_400, -1, 86_401, True, None, "1"])
@@ -177,4 +180,4 @@ def test_what_is_read_fits_the_schema_and_what_fits_is_read(read, value):
         good, told = True, ""
     except MotionloomError as error:
         good, told = False, str(error)
-    assert valid(SCHEMA, value) is good or "must be after 'from'" in told or "before they begin" in told
+    assert valid(mask_schema(), value) is good or "must be after 'from'" in told or "before they begin" in told

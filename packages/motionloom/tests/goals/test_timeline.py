@@ -1,6 +1,5 @@
 """Timeline files: what the keys mean, what is refused and on which line, and that the schema says the same."""
 
-import json
 import os
 import re
 from pathlib import Path
@@ -13,8 +12,9 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
+from motionloom.goals.schemas import timeline_schema
 from motionloom.goals.segment import Segment
-from motionloom.goals.timeline import SCHEMA, plain_timeline, read_timeline, timeline_from
+from motionloom.goals.timeline import plain_timeline, read_timeline, timeline_from
 from motionloom.io import lined_yaml
 from motionloom.motion import Motion
 from motionloom.requests.fields import specs
@@ -298,7 +298,7 @@ def test_plain_values_survive(tmp_path, value):
 
 
 def test_the_schema_has_the_readers_keys():
-    schema = json.loads(SCHEMA.read_text())
+    schema = timeline_schema()
     assert set(schema["properties"]) == set(WHOLE)
     assert set(schema["$defs"]["segment"]["anyOf"][1]["properties"]) == set(PART)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
@@ -338,13 +338,13 @@ def test_the_schema_and_the_reader_agree(read, value):
         accepted = True
     except MotionloomError:
         accepted = False
-    assert accepted == valid(SCHEMA, value)
+    assert accepted == valid(timeline_schema(), value)
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_the_examples_are_read_and_fit_the_schema(example):
     assert read_timeline(example).segments
-    assert valid(SCHEMA, yaml.safe_load(example.read_text()))
+    assert valid(timeline_schema(), yaml.safe_load(example.read_text()))
 
 
 def test_prompts_make_the_timeline_that_a_file_of_them_makes(read):
@@ -366,7 +366,7 @@ def test_the_document_explains_every_key_with_an_example_that_is_read(tmp_path):
     assert {key for segment in plain["segments"] if isinstance(segment, dict) for key in segment} == set(
         specs(SegmentKeys)
     )
-    assert valid(SCHEMA, plain)
+    assert valid(timeline_schema(), plain)
 
 
 def test_numbers_beyond_all_bounds_are_refused_wherever_they_are(tmp_path):

@@ -2,13 +2,15 @@
 
 import argparse
 import inspect
+import json
 import runpy
 from pathlib import Path
 
 import pytest
 
-from motionloom.cli import parser
+from motionloom.cli import main, parser
 from motionloom.cli.options import option
+from motionloom.requests.export import Export
 from motionloom.requests.fields import specs
 from motionloom.requests.tasks import REQUESTS
 
@@ -78,6 +80,22 @@ def test_assistants_have_a_tool_for_every_task(tmp_path: Path) -> None:
     tools = Assistant(project, Worker(project, limits))
     for task, request in REQUESTS.items():
         assert set(inspect.signature(tools.tool(task)).parameters) == set(specs(request))
+    assert set(inspect.signature(tools.export).parameters) == set(specs(Export))
+
+
+def test_a_file_of_a_motion_is_asked_alike_everywhere(tmp_path: Path) -> None:
+    pytest.importorskip("starlette", reason="needs the extra 'studio'")
+    from motionloom.server.limits import Limits
+    from motionloom.server.openapi import document
+
+    commands = next(one.choices for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
+    known, options = specs(Export), commands["export"]._option_string_actions
+    by_name = {"motion", "format", "person", "name"}  # which files say
+    for name in known.keys() - by_name - {"skeleton"}:
+        assert known[name].help in options[option(name, known[name])].help
+    said = document(Limits())["paths"]["/motions/{id}.{format}"]["get"]["parameters"]
+    assert {one["name"] for one in said} == known.keys() - {"motion", "name"} | {"id"}
+    assert {one["name"]: one["description"] for one in said}["mirror"] == known["mirror"].help
 
 
 def test_the_picture_of_the_architecture_is_that_of_the_code() -> None:
@@ -89,10 +107,15 @@ def test_the_picture_of_the_architecture_is_that_of_the_code() -> None:
     assert [room for room in rooms if not (package / room).is_dir()] == []
 
 
-def test_the_schema_of_timeline_files_is_what_the_fields_say() -> None:
-    pytest.importorskip("starlette", reason="needs the extra 'studio'")
-    written = runpy.run_path(str(ROOT / "tools" / "write_types.py"))
-    assert written["SCHEMA"].read_text(encoding="utf-8") == written["timelines"](), "run tools/write_types.py"
+@pytest.mark.parametrize(("command", "kind"), [("control", "goal"), ("predict", "mask"), ("compose", "timeline")])
+def test_the_schema_of_a_kind_of_file_is_printed(command: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    from motionloom.goals.schemas import SCHEMAS
+
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--schema"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == SCHEMAS[kind]()
+    assert json.loads(SCHEMAS[kind]())["title"] == f"motionloom {kind}"
 
 
 def test_goals_that_assistants_are_shown_are_goals(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 | option | command line | server, assistants | batch | live |
 |---|---|---|---|---|
 | best of several | every task | every task | every task that samples | no: frames are shown as they come |
-| adapters | all but predict, switch | of the whole server | of the whole job | yes |
+| adapters | all but predict, switch | of the whole server, of every job | of the whole job | yes |
 | skeleton, root | every task | when a motion is exported | yes | yes |
 | what happened | `--json` | every result | measures of every motion | `--json` |
 
@@ -26,8 +26,10 @@ from motionloom.bulk.batch import batch
 from motionloom.bulk.metadata import read_batch
 from motionloom.cli import main, parser
 from motionloom.cli.options import option
+from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.requests.batch import Batch, RowKeys
+from motionloom.requests.export import Export
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import PredictionSampling, Sampling
 from motionloom.requests.tasks import REQUESTS
@@ -163,10 +165,36 @@ def test_the_server_and_assistants_have_them_too(task: str, files: Path, tmp_pat
     assert job.error is None
     for one in job.public()["results"]:
         assert all(did["sentence"] for did in one["happened"])
-        stored = project.motion(one["id"])
-        made = io.load(export(project, stored, "npz", skeleton="mixamo", person=0, root=OWN_ROOT))
+        made = io.load(
+            export(project, Export(motion=one["id"], format="npz", skeleton="mixamo", person=0, root=OWN_ROOT))
+        )
         hips = made.positions()[:, made.skeleton.names.index("mixamorig:Hips")]
         assert np.ptp(hips[:, [0, 2]], axis=0).max() < 1e-6
+
+
+@pytest.mark.parametrize("task", sorted(set(REQUESTS) - {"predict", "switch"}))
+def test_a_job_of_the_server_has_adapters_of_its_own(task: str, files: Path, tmp_path: Path) -> None:
+    """Those in the project's folder; others have none of it."""
+    pytest.importorskip("starlette", reason="needs the extra 'studio'")
+    from motionloom.server.drawing import Models, draw
+    from motionloom.server.job_request import read_request
+    from motionloom.server.limits import Limits
+    from motionloom.server.project import Project
+
+    prior, limits, project = tiny.prior(), Limits(), Project(tmp_path, Limits())
+    tiny.adapter(prior).save(project.adapters / "zombie.safetensors")
+    models, plain = Models(prior, block(prior)), asked(task, files, project) | {"best_of": 1}
+    with pytest.raises(MotionloomError, match=r"'adapter' names 'none\.safetensors', and there is no such file"):
+        read_request(plain | {"adapter": ["none.safetensors"]}, project, limits)
+
+    def drawn(*adapters: str) -> np.ndarray:
+        request = read_request(plain | {"adapter": list(adapters)}, project, limits)
+        [made] = draw(models, request, lambda done, of: None)
+        return np.stack([one.positions() for one in made.people])
+
+    before, taught = drawn(), drawn("zombie.safetensors:0.5")
+    assert np.abs(taught - before).max() > 1e-4
+    assert np.array_equal(drawn(), before)
 
 
 def test_assistants_can_say_it_and_export_on_skeletons(tmp_path: Path) -> None:

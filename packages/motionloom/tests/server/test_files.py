@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from motionloom import load
+from motionloom.errors import MotionloomError
 from motionloom.io import load_scene, save
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
 from motionloom.motion import Motion
-from motionloom.retarget import MODES
+from motionloom.requests.export import ROOTS, Export
 from motionloom.retarget.named import named_skeleton
 from motionloom.server.files import export
 from motionloom.server.limits import Limits
@@ -77,16 +78,29 @@ def test_the_way_is_carried_by_what_is_asked(tmp_path: Path) -> None:
     root[:, 2] += np.arange(40) / 20
     stored = project.add((Motion(SMPL22, 20, root, np.tile([1.0, 0, 0, 0], (40, 22, 1))),), {})
     ways = {}
-    for mode in (*MODES, None):
-        back = load(export(project, stored, "npz", skeleton="unreal", person=None, root=mode))
+    for mode in (*ROOTS, None):
+        asked = Export(motion=stored.id, format="npz", skeleton="unreal", root=mode)
+        back = load(export(project, asked))
         where = back.positions()[:, [back.skeleton.index(name) for name in ("root", "pelvis")]]
         ways[mode] = np.linalg.norm((where[-1] - where[0])[:, [0, 2]], axis=-1)
     assert ways["motion"].min() > 1.5
     assert ways["hips"][0] < 0.01 < 1.5 < ways["hips"][1]
     assert ways["in-place"].max() < 0.01
-    for skeleton, mode in ((None, "hips"), ("unreal", "feet")):
-        with pytest.raises(Refusal, match=f"a root is one of motion, hips, in-place.*got '{mode}'"):
-            export(project, stored, "npz", skeleton=skeleton, person=None, root=mode)
+    with pytest.raises(Refusal, match="'root' goes with a 'skeleton'"):
+        export(project, Export(motion=stored.id, format="npz", root="hips"))
+    with pytest.raises(MotionloomError, match="root is 'feet'; there are motion, hips, in-place"):
+        Export(motion=stored.id, root="feet")
+
+
+def test_a_part_is_exported_mirrored_and_at_another_rate(server: Server, walk: str, tmp_path: Path) -> None:
+    how = "start=0.5&end=1.5&fps=40&mirror=true"
+    back = load(fetched(server, f"/motions/{walk}.npz?{how}", tmp_path / "part.npz"))
+    whole = load(fetched(server, f"/motions/{walk}.npz", tmp_path / "whole.npz"))
+    expected = whole.crop(0.5, 1.5).mirror().resample(40)
+    assert back.fps == 40
+    assert np.abs(back.positions() - expected.positions()).max() < 1e-6
+    status, _, data = server.ask("GET", f"/motions/{walk}.npz?fps=fast")
+    assert (status, b"'fps' must be a number; got 'fast'" in data) == (400, True)
 
 
 def test_a_page_plays_it_with_a_character_of_ones_own_if_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +112,7 @@ def test_a_page_plays_it_with_a_character_of_ones_own_if_asked(tmp_path: Path, m
     stored = project.add((standing(20), standing(20, speed=1.0)), {"prompt": "two <people>"})
     own = project.add_character(Hero().write(project.part(".glb")), "hero.glb", ".glb")
     for skeleton, person, people in ((None, None, 2), (None, 1, 1), ("mixamo", None, 2), (own, None, 2), (own, 0, 1)):
-        file = export(project, stored, "html", skeleton=skeleton, person=person)
+        file = export(project, Export(motion=stored.id, format="html", skeleton=skeleton, person=person))
         given = Reader(file.read_text()).given
         [take] = given["takes"]
         assert (take["name"], len(take["people"])) == ("two <people>", people)

@@ -5,7 +5,7 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
-from motionloom.goals.hold import HeldPart, Hold
+from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.motion import Motion
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
@@ -23,11 +23,11 @@ PAST, SOURCE = person(1.0, 30.0), person(4.0, 30.0).frames(50, 110)
 
 def held(
     *joints: str, spans: tuple[tuple[float, float], ...] = ((0.0, np.inf),), source: Motion = SOURCE, align: bool = True
-) -> Hold:
-    return Hold(source, (HeldPart(joints, spans),), align)
+) -> FixedJoints:
+    return FixedJoints(source, (FixedPart(joints, spans),), align)
 
 
-def future(hold: Hold | None, *, past: Motion = PAST, seconds: float = 0.8, **asked) -> Motion:
+def future(hold: FixedJoints | None, *, past: Motion = PAST, seconds: float = 0.8, **asked) -> Motion:
     made = predict(PREDICTOR, past, count=1, seconds=seconds, steps=2, hold=hold, **asked)[0]
     return made.frames(len(past), len(made))
 
@@ -158,7 +158,7 @@ def test_parts_laid_over_a_motion_are_exact_at_weight_one_and_nothing_at_none() 
 MISTAKES = {
     "unknown": (held("left_wing"), "no part called 'left_wing'"),
     "nothing": (held(), "nothing to hold"),
-    "no parts": (Hold(SOURCE, ()), "nothing to hold"),
+    "no parts": (FixedJoints(SOURCE, ()), "nothing to hold"),
     "no span": (held("head", spans=()), "nothing to hold"),
     "backwards": (held("head", spans=((0.5, 0.2),)), "no stretch from 0.5 to 0.2"),
     "negative": (held("head", spans=((-1.0, 0.2),)), "no stretch"),

@@ -30,7 +30,7 @@ def test_it_is_drawn_again_until_the_number_is_right(prior: Prior, monkeypatch: 
     monkeypatch.setattr(worded, "_drawn", draw_one)
     monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
     asked = worded.read(prior, "a person jumps twice")
-    (made,) = worded.draw(prior, [asked], sampling=Sampling(seed=5))
+    (made,) = worded.draw(prior, [asked], seeds=[5])
     assert [one.measured for one in made.amounts] == [2]
     assert made.amounts[0].kept
     assert not made.amounts[0].problem
@@ -44,7 +44,7 @@ def test_the_nearest_is_kept_and_told(prior: Prior, monkeypatch: pytest.MonkeyPa
     still = generate(prior, "a person stands", seconds=1.0, steps=1)[0]
     monkeypatch.setattr(worded, "_drawn", lambda *_: still)
     monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
-    (made,) = worded.draw(prior, [worded.read(prior, "a person jumps three times")])
+    (made,) = worded.draw(prior, [worded.read(prior, "a person jumps three times")], seeds=[0])
     assert made.amounts[0].measured == 4
     assert made.amounts[0].problem == "3 jumps asked; 4 jumps drawn"
 

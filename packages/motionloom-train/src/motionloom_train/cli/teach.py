@@ -6,10 +6,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.reading import as_rate, as_unit
-from motionloom.cli.sampling import fail
+from motionloom.cli.options import add_options
+from motionloom.cli.reading import as_unit
+from motionloom.cli.sampling import fail, request_of
 from motionloom.cli.writing import add_force, check_overwriting
 from motionloom.formats import readable
+from motionloom.requests.export import Source
+from motionloom.requests.teach import Teach
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -32,30 +35,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="the adapter (default taught.safetensors)")
     parser.add_argument("--check", action="store_true", help="only say what is wrong with the clips")
-    parser.add_argument("--name", help="name on the adapter's card (default: that of the file)")
-    parser.add_argument("--licence", default="", help="what one may do with the adapter: the clips' owner says")
-    parser.add_argument("--steps", type=int, help="training steps (default 1300; more clips may need more)")
-    parser.add_argument("--rank", type=int, help="size of the change: 16 (default) makes a file of 1.5 MB")
-    parser.add_argument(
-        "--keep",
-        type=float,
-        metavar="SHARE",
-        help="share of the training on what the weights know already, 0 to 0.9 (default 0.5)",
-    )
-    parser.add_argument("--no-mirror", action="store_true", help="do not learn from the clips' mirror images")
-    parser.add_argument("--seed", type=int, default=0, help="the same seed teaches the same (default 0)")
+    add_options(parser, Teach)
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="what is taught (default: default)")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--threads", type=int, help="CPU threads")
-    parser.add_argument(
-        "--amp",
-        choices=("auto", "bf16", "float32"),
-        default="auto",
-        help="what is multiplied in; auto takes what is quicker on this machine (default)",
-    )
     parser.add_argument("--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF: m, cm, inch, or metres")
-    parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the files (default y)")
-    parser.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the files' (AMC: 120)")
+    add_options(parser, Source, helps={"up": "the axis that is up in the files; without it y"})
     parser.add_argument("--json", action="store_true", help="print what was made or found as JSON")
     add_force(parser)
     parser.set_defaults(run=run_teach)
@@ -83,7 +68,7 @@ def run_teach(arguments: argparse.Namespace) -> int:
     examples = [
         example
         for one, motion in zip(captioned, motions, strict=True)
-        for example in make_examples(motion, one, mirror=not arguments.no_mirror)
+        for example in make_examples(motion, one, mirror=arguments.mirror)
     ]
     _teach(arguments, examples, out, captioned)
     return 0
@@ -166,12 +151,7 @@ def _teach(
         if arguments.threads < 1:
             fail(f"--threads must be 1 or more; got {arguments.threads}")
         set_threads(arguments.threads)
-    given = {key: getattr(arguments, key) for key in ("steps", "rank", "keep") if getattr(arguments, key) is not None}
-    if not 0 <= arguments.seed < 2**31:
-        fail(f"--seed must be 0 or more and below 2**31; got {arguments.seed}")
-    lesson = Lesson(
-        name=arguments.name or out.stem, licence=arguments.licence, seed=arguments.seed, amp=arguments.amp, **given
-    )
+    lesson = request_of(arguments, Lesson, {"name": arguments.name or out.stem})
     prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
     adapter = teach(prior, examples, lesson, device=arguments.device, say=lambda line: print(line, file=sys.stderr))

@@ -6,16 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
 from motionloom.bulk.on_robot import OnRobot, Save, check_format, on_robot
 from motionloom.bulk.row import Asked, Sources, hash_adapters, unexpected
-from motionloom.bulk.sampling import draw_group, groups
-from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
-from motionloom.goals.goal import start_of
 from motionloom.goals.roles import prompts_of
 from motionloom.io import load
 from motionloom.motion import Motion
@@ -25,10 +20,9 @@ from motionloom.requests.tasks import REQUESTS
 from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.control import Controlled, judged, moved, steered_features
-from motionloom.tasks.run import Models, Plan, Result, closed, run
-from motionloom.tasks.sampling import Rows, with_best_seeds
-from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
+from motionloom.tasks.control import Controlled, judged
+from motionloom.tasks.run import Models, Plan, run, run_each
+from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features
 from motionloom.weights.container import PAIRS, weights_digest
 from motionloom.weights.prior import find_weights
 
@@ -217,13 +211,13 @@ class Maker:
     def _shared(self, asked: Sequence[Asked], *, alone: bool) -> Iterator[list[Asked]]:
         """Rows that are made together."""
         together = 1 if alone else self.together
-        plain = [one for one in asked if one.row.task == "generate" and one.timeline is None]
-        for numbers in groups(self.prior, [one.frames for one in plain], together):
-            yield [plain[number] for number in numbers]
-        same: dict[tuple[int, int], list[Asked]] = {}
+        same: dict[Any, list[Asked]] = {}
+        for one in sorted(asked, key=lambda one: -one.frames):
+            if one.row.task == "generate" and one.timeline is None:
+                same.setdefault((-(-one.frames // self.prior.net.config.patch), one.best_of), []).append(one)
         for one in asked:
             if one.row.task == "control":
-                same.setdefault((id(one.goal), one.best_of), []).append(one)
+                same.setdefault((id(one.goal), one.best_of, "control"), []).append(one)
         for rows in same.values():
             yield from (rows[at : at + together] for at in range(0, len(rows), together))
         yield from ([one] for one in asked if one.row.task in ("duet", "export") or one.timeline is not None)
@@ -249,30 +243,16 @@ class Maker:
             return [self._export(first, first.clip)]
         if first.row.task in ("control", "compose"):
             self._only_ddpm(first)
-        if first.row.task == "control":
-            return [
-                self._alone(one, made.motion, error=round(made.error, 4), worst=round(made.worst, 4))
-                for one, made in zip(rows, self._control(rows), strict=True)
-            ]
         if first.row.task == "duet":
             return [self._duet(first)]
         if first.timeline is not None:
             [made] = run(self._plan(first), self.models)
             kept = {} if made.about is None else {"keeps": all(one.kept for one in made.about.amounts)}
             return [self._measured(first, made.people[0], **kept)]
-        options = self.options
-        drawn = draw_group(
-            self.prior,
-            [one.row.words for one in rows],
-            [one.frames for one in rows],
-            seeds=[self._best_seed(one) for one in rows],
-            guidance=options.guidance,
-            steps=options.steps,
-            solver=options.solver,
-        )
+        made = [one for _, one in run_each([self._plan(one) for one in rows], self.models)]
         return [
-            self._alone(one, finish(self.prior, features, foot_lock=not options.raw))
-            for one, features in zip(rows, drawn, strict=True)
+            self._measured(one, result.people[0], **_misses(result.about))
+            for one, result in zip(rows, made, strict=True)
         ]
 
     def _plan(self, asked: Asked) -> Plan:
@@ -302,14 +282,6 @@ class Maker:
             goals=goals,
         )
 
-    def _best_seed(self, asked: Asked) -> int:
-        """The row's own seed, or the best of several; tried alone, so that it is the same whatever rows are beside."""
-        if asked.best_of == 1:
-            return asked.seed
-        rows = Rows([asked.row.words], [asked.frames], [asked.seed])
-        (seed,) = with_best_seeds(self.prior, rows, self._sampling(asked)).seeds
-        return seed
-
     def _sampling(self, asked: Asked, guidance: float | None = None) -> Sampling:
         """How a row is sampled; guidance: of its timeline."""
         options = self.options
@@ -319,6 +291,7 @@ class Maker:
             solver=options.solver,
             seed=asked.seed,
             best_of=asked.best_of,
+            batch_size=self.together if asked.timeline is None and asked.row.task != "duet" else None,
         )
 
     def _export(self, asked: Asked, clip: Path) -> Made:
@@ -326,25 +299,6 @@ class Maker:
         motion = load(clip)
         person = motion if motion.skeleton == SMPL22 else to_smpl22(motion)
         return self._finished(asked, [motion], [measure(person, asked.text, self.judge)])
-
-    def _control(self, rows: list[Asked]) -> list[Controlled]:
-        """As `motionloom.tasks.control.control`, for prompts and seeds that share a goal."""
-        goal = rows[0].goal
-        assert goal is not None
-        place = start_of(goal)
-        drawn = steered_features(
-            self.prior,
-            [one.row.words for one in rows],
-            goal.seen_from(place),
-            seeds=[one.seed for one in rows],
-            sampling=self._sampling(rows[0]),
-        )
-        foot_lock = not self.options.raw
-        placed = [
-            moved(to_motion(features.astype(np.float64), self.prior.fps, foot_lock=foot_lock), place)
-            for features in drawn
-        ]
-        return [judged(fit(motion, goal), motion, goal) for motion in placed]
 
     def _duet(self, asked: Asked) -> Made:
         """Two people, one pair at a time: what is drawn beside it would change the last bits."""
@@ -354,18 +308,12 @@ class Maker:
         measured = measure_two(duet, texts, self.judge)
         if asked.goal is not None:
             person = asked.row.whom
-            missed = judged(duet[person], duet[person], asked.goal)
-            measured[person] |= {"error": round(missed.error, 4), "worst": round(missed.worst, 4)}
+            measured[person] |= _misses(judged(duet[person], duet[person], asked.goal))
         return self._finished(asked, duet, measured)
 
     def _only_ddpm(self, asked: Asked) -> None:
         if self.options.solver != SOLVER:
             raise MotionloomError(f"the task {asked.row.task} is made with the solver {SOLVER}")
-
-    def _alone(self, asked: Asked, motion: Motion, **measured: float) -> Made:
-        """A motion of a prompt, whose loop is not closed yet."""
-        made = closed(self._plan(asked), self.models, Result((motion,)))
-        return self._measured(asked, made.people[0], **measured)
 
     def _measured(self, asked: Asked, motion: Motion, **measured: float) -> Made:
         return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])
@@ -383,3 +331,8 @@ class Maker:
         if self.options.fps is not None:
             people = [motion.resample(self.options.fps) for motion in people]
         return Made(tuple(people), tuple(measured))
+
+
+def _misses(controlled: Controlled | None) -> dict[str, float]:
+    """How far a motion is from its goal, in metres; nothing where there is none."""
+    return {} if controlled is None else {"error": round(controlled.error, 4), "worst": round(controlled.worst, 4)}

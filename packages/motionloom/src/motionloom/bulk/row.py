@@ -236,7 +236,7 @@ class Sources:
             raise unexpected(error) from error
 
     def _ask(self, row: Row) -> Asked:
-        timeline = start = target = clip = None
+        timeline = start = clip = None
         goal: tuple[Goal | None, str | None] = (None, None)
         robot = self._robot(row)
         metre = 1.0 if robot is None else robot.metre
@@ -255,10 +255,7 @@ class Sources:
             frames = frames_in(length, self.fps) if timeline is None else timeline.frames
         if row.goal is not None:
             goal = self._goal(row.goal, frames, metre)
-        if row.skeleton:
-            target = self._skeleton(row.skeleton, Field(row.skeleton, "skeleton"))
-        if robot is None and row.skeleton is None and self.skeleton is not None:
-            target = self._skeleton(self.skeleton, None)
+        target = self._target(row, robot)
         said = {
             "common": self._common,
             "task": row.task,
@@ -278,6 +275,14 @@ class Sources:
             said |= {"pair": self._pair, "person": row.whom + 1}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of, clip, robot)
+
+    def _target(self, row: Row, robot: OnRobot | None) -> Skeleton | None:
+        """What the motion is put on: the row's skeleton or, without that and a robot, the job's."""
+        if row.skeleton:
+            return self._skeleton(row.skeleton, Field(row.skeleton, "skeleton"))
+        if robot is None and row.skeleton is None and self.skeleton is not None:
+            return self._skeleton(self.skeleton, None)
+        return None
 
     def _worded(self, row: Row, metre: float) -> tuple[Timeline | None, str | None]:
         """The row's prompt as a timeline, where numbers in it are kept, and its hash.

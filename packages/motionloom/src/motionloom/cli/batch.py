@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import add_adapters, fail
-from motionloom.cli.skeletons import HANDS, ROOTS
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.requests.batch import Batch
 
@@ -63,8 +62,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
     add_options(parser, Batch)
     parser.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motions on this skeleton")
-    parser.add_argument("--root", choices=ROOTS, help="what carries the way on a skeleton with a root bone")
-    parser.add_argument("--hands", choices=HANDS, default="as-is", help="pose of the hands, on skeletons with fingers")
     parser.add_argument(
         "--out-unit", type=as_unit, default=1.0, metavar="UNIT", help="unit of --format bvh: m (default), cm, inch ..."
     )
@@ -167,7 +164,7 @@ def _options(arguments: argparse.Namespace) -> "Options":
     named = {one.name for one in fields(Options)} - {"loop"}
     return Options(
         **{name: value for name, value in vars(arguments).items() if name in named},
-        adapters=arguments.adapter,
+        adapters=list(arguments.adapter),
         raw=not arguments.foot_lock,
         loop=arguments.blend if arguments.loop else None,
         unit=arguments.out_unit,

@@ -6,13 +6,14 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.looping import check_loop, looped
-from motionloom.cli.options import add_options
+from motionloom.cli.looping import check_loop
+from motionloom.cli.options import PrintSchema, add_options
 from motionloom.cli.robots import metres_told
-from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, remark_unknown, sampling_of
+from motionloom.cli.sampling import add_sampling, check_outs, fail, load_prior, remark_unknown, request_of, results
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
 from motionloom.requests.compose import Compose
+from motionloom.requests.reading import settled
 from motionloom.requests.shared import FINISH
 from motionloom.requests.timeline import SegmentKeys
 
@@ -43,16 +44,11 @@ def add(subparsers) -> None:
     add_options(parser, Compose, "seed", "guidance", "steps", "best_of", *FINISH)
     add_sampling(parser)
     parser.add_argument("--check", action="store_true", help="only say what would be made")
-    parser.add_argument("--schema", action="store_true", help="print the JSON Schema of timeline files")
+    parser.add_argument("--schema", action=PrintSchema, kind="timeline")
     parser.set_defaults(run=_compose)
 
 
 def _compose(arguments: argparse.Namespace) -> int:
-    if arguments.schema:
-        from motionloom.goals.timeline import SCHEMA
-
-        print(SCHEMA.read_text(encoding="utf-8"), end="")
-        return 0
     from dataclasses import replace
 
     outs, target = ([], None) if arguments.check else check_outs(arguments)
@@ -183,29 +179,19 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
 
 def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:
     from motionloom.cli.reading import load_motion
-    from motionloom.tasks import long
-    from motionloom.tasks.run import moves
+    from motionloom.tasks.run import Models, Plan
 
-    start = None if timeline.start is None else load_motion(arguments, timeline.start)
-    named = {"guidance": timeline.guidance, "seed": timeline.seed}
-    settings: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
-    with bar("composing") as move:
-        pieces = long.compose(
-            prior,
-            timeline.segments,
-            start=start,
-            path=timeline.path,
-            foot_lock=arguments.foot_lock,
-            progress=moves(move, arguments.steps, len(timeline.segments)),
-            **(settings | sampling_of(arguments)),
-        )
-        if not arguments.loop:
-            yield from pieces
-            return
-        from motionloom.tasks.splice import concatenated
-
-        seed = arguments.seed if arguments.seed is not None else timeline.seed or 0
-        yield looped(arguments, prior, concatenated(*pieces), timeline.segments[-1].text, seed=seed)
+    values = request_of(arguments, Compose, {"timeline": timeline})
+    plan = Plan(
+        task="compose",
+        values=values,
+        sampling=settled(values, timeline),
+        timeline=timeline,
+        start=None if timeline.start is None else load_motion(arguments, timeline.start),
+        in_pieces=not arguments.loop,
+    )
+    for result in results("composing", plan, Models(prior)):
+        yield from result.people
 
 
 def _saved(streams: Sequence["Stream"]) -> list["Stream"]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from motionloom.cli.finished import Finished, finished_motions
 from motionloom.cli.looping import check_loop, note_loop
 from motionloom.cli.newcomers import one_sentence
-from motionloom.cli.options import add_options
+from motionloom.cli.options import PrintSchema, add_options
 from motionloom.cli.sampling import (
     add_sampling,
     check_outs,
@@ -73,7 +73,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         metavar="NAME|FILE",
         help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
     )
-    parser.add_argument("--schema", action="store_true", help="print what a goal file may hold as JSON Schema and end")
+    parser.add_argument("--schema", action=PrintSchema, kind="goal")
     add_one_file(parser)
     add_sampling(parser)
     parser.set_defaults(run=run_control)
@@ -81,11 +81,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def run_control(arguments: argparse.Namespace) -> int:
     """``motionloom control PROMPT --goal FILE``."""
-    if arguments.schema:
-        from motionloom.goals.goal_file import SCHEMA
-
-        print(SCHEMA.read_text(encoding="utf-8"), end="")
-        return 0
     from motionloom.tasks.run import Models, Plan
 
     outs, target = check_outs(arguments)

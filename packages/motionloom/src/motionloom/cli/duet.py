@@ -20,10 +20,10 @@ from motionloom.cli.sampling import (
     results,
     take_text_anywhere,
 )
-from motionloom.cli.skeletons import CHARACTERS, Target, own_outs, read_target
+from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.two_bodies import two_body_measures, two_body_remarks
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
-from motionloom.formats import writable
+from motionloom.formats import characters, writable
 from motionloom.requests.duet import Duet
 from motionloom.requests.shared import FINISH, SAMPLED
 
@@ -281,7 +281,7 @@ def _check(arguments: argparse.Namespace) -> None:
 def check_pair_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
     """The files to write, those of one person in twos of a kind, first that of the first person; and the skeleton."""
     outs = arguments.out or [Path("duet.glb")]
-    if not arguments.out and Path(arguments.skeleton or "").suffix.lower() in CHARACTERS:
+    if not arguments.out and Path(arguments.skeleton or "").suffix.lower() in characters():
         outs = [out for name in ("duet_a", "duet_b") for out in own_outs(arguments, name)]
     skin = read_target(arguments, outs)
     if skin is not None:

@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.options import add_options
 from motionloom.cli.reading import (
     RATE_ASSUMED,
     add_reading,
-    as_rate,
     check_size,
     crop,
     note_rate,
@@ -18,6 +18,7 @@ from motionloom.cli.reading import (
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
 from motionloom.formats import readable, writable
+from motionloom.requests.export import Stretch
 
 if TYPE_CHECKING:
     from motionloom.kinematics.deeds import Deeds
@@ -41,10 +42,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     export.add_argument("--out", type=Path, metavar="NAME", help="the file to write, instead of OUT")
     add_reading(export)
-    export.add_argument("--fps", type=as_rate, metavar="N", help="resample to this frame rate")
+    add_options(export, Stretch, "fps", "mirror")
     add_skeleton(export, own="IN's")
     export.add_argument("--source-map", "--joint-map", type=Path, metavar="JSON", help="which joints are which, of IN")
-    export.add_argument("--mirror", action="store_true", help="exchange left and right")
     export.add_argument(
         "--check", action="store_true", help="only print how good the clip of a --robot is, as JSON (robot-check)"
     )
@@ -95,11 +95,27 @@ def run_export(arguments: argparse.Namespace) -> int:
             f"{len(arguments.inputs)} motions go into one file as animations of a character: --skeleton hero.glb "
             "--out moving.glb; else export one at a time"
         )
-    names = None if skin is None else skin.names([path.stem for path in arguments.inputs])
     read = [_exported(arguments, path, skin) for path in arguments.inputs]
     check_overwriting(arguments, [target])
     if arguments.source_map and not skin:
         raise MotionloomError("--source-map says which joints are which for a --skeleton; name one")
+    _write(arguments, target, skin, read)
+    held = (skin and skin.told()) or "; ".join(_summary(motion) for motion, _, _ in read)
+    print(f"wrote {target}: {held}")
+    note_rate(arguments, arguments.inputs)
+    return 0
+
+
+def _write(
+    arguments: argparse.Namespace,
+    target: Path,
+    skin: Target | None,
+    read: "list[tuple[Motion, float | None, dict[str, str]]]",
+) -> None:
+    """Write what was read; several motions into a character's own file."""
+    from motionloom import io
+
+    names = None if skin is None else skin.names([path.stem for path in arguments.inputs])
     motions = [motion for motion, _, _ in read]
     motion, unit, orders = read[0]
     if skin and names and skin.writes(target):
@@ -116,10 +132,6 @@ def run_export(arguments: argparse.Namespace) -> int:
     else:
         _only_bvh(arguments, target)
         (io.save if skin is None else skin.save)(motion, target)
-    held = (skin and skin.told()) or "; ".join(_summary(motion) for motion in motions)
-    print(f"wrote {target}: {held}")
-    note_rate(arguments, arguments.inputs)
-    return 0
 
 
 def _exported(
@@ -162,12 +174,12 @@ def run_view(arguments: argparse.Namespace) -> None:
 
 def _write_page(arguments: argparse.Namespace, target: Path) -> None:
     """A take for each file, with everybody in it, on the character that the line names."""
-    from motionloom.io.character import load_character
+    from motionloom import io
     from motionloom.viz.page import MAX_BYTES, Take, write_page
 
     character, put = None, None
     if arguments.skeleton is not None:
-        character = load_character(arguments.skeleton)
+        character = io.open_character(arguments.skeleton)
         put = Target(arguments.skeleton, character.skeleton, character=character)
     takes = []
     for path in arguments.inputs:

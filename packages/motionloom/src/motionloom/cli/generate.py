@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.finished import finished_motions
-from motionloom.cli.looping import check_loop, looped
+from motionloom.cli.looping import check_loop
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.options import add_options
 from motionloom.cli.sampling import (
@@ -20,7 +20,7 @@ from motionloom.cli.sampling import (
     load_prior,
     places,
     report,
-    sampling_of,
+    request_of,
     unknown_words,
 )
 from motionloom.cli.skeletons import add_one_file
@@ -70,12 +70,8 @@ def _generate(arguments: argparse.Namespace) -> int:
         check_loop(arguments, found.seconds)
     remarks = unknown_words(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
-    asked = [timelines[caption] for caption in captions]
     worded: list[Worded] = []
-    drawn = (
-        looped(arguments, prior, motion, asked[number].segments[-1].text, seed=arguments.seed + number)
-        for number, motion in enumerate(_drawn(arguments, prior, asked, worded, unknown=remarks))
-    )
+    drawn = _drawn(arguments, prior, [(prompt, timelines[prompt]) for prompt in prompts], worded, unknown=remarks)
     seated: list[list[Seat]] = []
     interrupted = made.take(([motion] for motion in _noting(seated, drawn, target)), told=arguments.json)
     motions = [
@@ -225,28 +221,25 @@ def _lines(file: Path) -> list[str]:
 def _drawn(
     arguments: argparse.Namespace,
     prior: "Prior",
-    asked: "list[Timeline]",
+    asked: "list[tuple[str, Timeline]]",
     worded: "list[Worded]",
     *,
     unknown: dict[str, str],
 ) -> "Iterator[Motion]":
     """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
-    from motionloom.requests.sampling import Sampling
-    from motionloom.tasks.worded import draw
+    from motionloom.tasks.run import Models, Plan, run_each
 
-    sampling = Sampling(**{name: value for name, value in sampling_of(arguments).items() if name != "count"})
+    plans = []
+    for number, (prompt, timeline) in enumerate(asked):
+        values = request_of(arguments, Generate, {"prompt": prompt})
+        sampling = replace(values.sampling, seed=arguments.seed + number * arguments.count)
+        plans.append(Plan(task="generate", values=values, sampling=sampling, timeline=timeline))
+    several = len(asked) * arguments.count > 1
     with bar("generating") as progress:
-        made = draw(
-            prior,
-            asked,
-            foot_lock=arguments.foot_lock,
-            sampling=sampling,
-            progress=progress,
-        )
-        for number, one in enumerate(made, start=1):
-            one = replace(one, unknown=unknown)
-            for line in one.shortfalls:
-                whose = f"motion {number}: " if len(asked) > 1 else ""
-                print(f"motionloom: {whose}{line}", file=sys.stderr)
+        for _, result in run_each(plans, Models(prior), progress):
+            one = replace(result.about, unknown=unknown)
             worded.append(one)
-            yield one.motion
+            for line in one.shortfalls:
+                whose = f"motion {len(worded)}: " if several else ""
+                print(f"motionloom: {whose}{line}", file=sys.stderr)
+            yield from result.people

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from motionloom.requests.export import RATE
 from motionloom.requests.fields import Spec, specs
 
 
@@ -64,10 +65,25 @@ def add_options(
         )
 
 
+class PrintSchema(argparse.Action):
+    """``--schema``: print the JSON Schema of a kind of file, and end."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, kind: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help=f"print the JSON Schema of {kind} files and end")
+        self.kind = kind
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from motionloom.goals.schemas import SCHEMAS
+
+        print(SCHEMAS[self.kind](), end="")
+        parser.exit()
+
+
 def _metavar(spec: Spec) -> str | tuple[str, ...]:
     if spec.words:
         return f"{{{','.join(spec.words)}}}"
-    one = {"whole": "N", "number": "S" if spec.unit else "X"}.get(spec.kind, "WORD")
+    number = {"seconds": "S", RATE: "N"}.get(spec.unit, "X")
+    one = {"whole": "N", "number": number}.get(spec.kind, "WORD")
     return ("FROM", "TO") if spec.size else one
 
 

@@ -10,14 +10,14 @@ from motionloom.cli.finished import Finished
 from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_futures
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.looping import check_loop_behind
-from motionloom.cli.options import add_options
-from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, load_motion, note_rate, read_clip
+from motionloom.cli.options import PrintSchema, add_options
+from motionloom.cli.reading import add_reading, check_size, crop, load_motion, note_rate, read_clip
 from motionloom.cli.sampling import add_sampling, bar, fail, request_of, results, sampling_of
 from motionloom.cli.skeletons import Target, read_target
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import readable
 from motionloom.requests.fields import specs
-from motionloom.requests.predict import NAMES, Predict, Switch
+from motionloom.requests.predict import NAMES, Held, Predict, Switch
 from motionloom.requests.shared import FINISH
 
 if TYPE_CHECKING:
@@ -33,16 +33,6 @@ LISTED = 40
 """Files named at the end; --json lists all."""
 SAME_BONE = 1e-4
 """Metres by which bones of one skeleton may differ from file to file: numbers are rounded when they are written."""
-
-
-class _PrintSchema(argparse.Action):
-    """Print what a mask file may hold, and end."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from motionloom.goals.mask_file import SCHEMA
-
-        print(SCHEMA.read_text(encoding="utf-8"), end="")
-        parser.exit()
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -74,11 +64,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     predict.add_argument("--mask", type=Path, metavar="FILE", help="a JSON file of parts and when they are held")
     predict.add_argument("--from", dest="source", type=Path, metavar="MOTION", help="what held parts move as")
-    predict.add_argument(
-        "--from-time", type=as_seconds, default=0.0, metavar="S", help="the second of --from at which it begins"
-    )
+    add_options(predict, Held, "from_time")
     predict.add_argument("--no-root", action="store_true", help=f"do not {specs(Predict)['root'].help}")
-    predict.add_argument("--schema", action=_PrintSchema, nargs=0, help="print the JSON Schema of mask files and end")
+    predict.add_argument("--schema", action=PrintSchema, kind="mask")
     _add_sampling(predict, "--from")
     predict.set_defaults(run=run_predict)
     _add_switch(subparsers)
@@ -117,24 +105,15 @@ def run_predict(arguments: argparse.Namespace) -> int:
     from motionloom.tasks.run import Plan
 
     check_rate(arguments)
-    if arguments.loop and arguments.seconds > LONG:
-        fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
-    if arguments.loop and arguments.no_root:
-        fail("--loop draws the way through the world, which --no-root leaves out; give one of them")
+    _check_asked(arguments)
     outs = arguments.out or [Path("futures")]
     skin = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
     if skin is not None:
         skin.names(["future"])
     own = skin and skin.suffix
-    if arguments.robot is None and "csv" in (arguments.format or ()):
-        fail("--format csv is for a robot's joint angles; name its model with --robot")
     formats = arguments.format or [own[1:] if own else "bvh"]
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
-    check_unit(arguments, [file for one in wanted for file in one.files])
-    check_overwriting(arguments, [file for one in wanted for file in one.files])
-    past, writing = _read_past(arguments, skin)
-    horizon = round(arguments.seconds * past.fps)
-    _check_size(arguments, past, horizon, wanted)
+    past, writing, horizon = _read_past(arguments, skin, wanted)
     hold = _hold(arguments, past, horizon)
     check_loop_behind(arguments, past.seconds, arguments.seconds, "nothing is held there" if hold else "")
     predictor = _predictor(arguments)
@@ -198,12 +177,9 @@ def run_switch(arguments: argparse.Namespace) -> int:
     for out in outs:
         check_output(out, own=own)  # files, and no folder
     wanted = targets(outs, arguments.count, [], pictures=False, own=own)
-    check_unit(arguments, [file for one in wanted for file in one.files])
-    check_overwriting(arguments, [file for one in wanted for file in one.files])
-    past, writing = _read_past(arguments, skin)
-    _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
+    past, writing, horizon = _read_past(arguments, skin, wanted)
     target = _like_past(arguments, arguments.target, past)
-    _check_poses(arguments, (len(past) + len(target) + round(arguments.seconds * past.fps)) * len(past.skeleton))
+    _check_poses(arguments, (len(past) + len(target) + horizon) * len(past.skeleton))
     check_loop_behind(arguments, past.seconds, arguments.seconds + target.seconds, f"{arguments.target} ends otherwise")
     predictor = _predictor(arguments)
     values = request_of(arguments, Switch, {"motion": past, "target": target})
@@ -289,13 +265,21 @@ def _caption(arguments: argparse.Namespace) -> str:
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Motion, Writing]":
+def _read_past(
+    arguments: argparse.Namespace, skin: Target | None, wanted: list[Files]
+) -> "tuple[Motion, Writing, int]":
+    """The past, how files say its numbers, and the frames that are made behind it."""
+    files = [file for one in wanted for file in one.files]
+    check_unit(arguments, files)
+    check_overwriting(arguments, files)
     whole, unit, orders = read_clip(arguments, arguments.past)
     check_size(arguments, arguments.past, whole)
     past = crop(whole, arguments)
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here; a past has at least two, to say where one goes: take a longer one")
-    return past, Writing(arguments.out_unit or unit or 1.0, orders, skin)
+    horizon = round(arguments.seconds * past.fps)
+    _check_size(arguments, past, horizon, wanted)
+    return past, Writing(arguments.out_unit or unit or 1.0, orders, skin), horizon
 
 
 def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
@@ -371,6 +355,15 @@ def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Fixed
 
 
 # What cannot be asked
+
+
+def _check_asked(arguments: argparse.Namespace) -> None:
+    if arguments.loop and arguments.seconds > LONG:
+        fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
+    if arguments.loop and arguments.no_root:
+        fail("--loop draws the way through the world, which --no-root leaves out; give one of them")
+    if arguments.robot is None and "csv" in (arguments.format or ()):
+        fail("--format csv is for a robot's joint angles; name its model with --robot")
 
 
 def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Files]) -> None:

@@ -5,7 +5,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.options import add_options
 from motionloom.formats import with_clips
+from motionloom.requests.export import Source, Stretch
+from motionloom.requests.shared import OnRobot
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -19,7 +22,7 @@ def add_reading(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF read: m, cm, inch, or metres"
     )
-    command.add_argument("--up", choices=("y", "z"), help="the axis that is up in the file (default: as people stand)")
+    add_options(command, Source, "up")
     command.add_argument(
         "--clip",
         dest="animation",
@@ -31,9 +34,8 @@ def add_reading(command: argparse.ArgumentParser) -> None:
         "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
     )
     add_robot(command)
-    command.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the file's (AMC: 120)")
-    command.add_argument("--start", type=as_seconds, metavar="S", help="begin at this second")
-    command.add_argument("--end", type=as_seconds, metavar="S", help="end at this second")
+    add_options(command, Source, "source_fps")
+    add_options(command, Stretch, "start", "end")
 
 
 def add_blender(command: argparse.ArgumentParser) -> None:
@@ -58,13 +60,7 @@ def add_robot(command: argparse.ArgumentParser) -> None:
         help="a humanoid robot's model (.xml of MuJoCo, .urdf): its joint angles are written and read, .csv or .npz",
     )
     command.add_argument("--robot-map", type=Path, metavar="JSON", help="which joints are which, of the --robot")
-    command.add_argument(
-        "--max-speed",
-        type=float,
-        metavar="RAD/S",
-        help="speed that no joint of the robot exceeds (default: the model's)",
-    )
-    command.add_argument("--avoid-collisions", action="store_true", help="keep the robot's parts out of each other")
+    add_options(command, OnRobot, "max_speed", "avoid_collisions")
     command.add_argument("--no-header", action="store_true", help="leave the names out of a .csv")
     command.add_argument("--figures", action="store_true", help="print how good the robot's clip is, as a line of JSON")
 
@@ -73,28 +69,6 @@ def _number(text: str) -> float:
     value = float(text)
     if not abs(value) < 1e9:
         raise ValueError
-    return value
-
-
-def as_rate(text: str) -> float:
-    """Frames per second, as an argparse type."""
-    try:
-        value = _number(text)
-    except ValueError:
-        value = 0.0
-    if not 0.1 <= value <= 1000:
-        raise argparse.ArgumentTypeError(f"a number of 0.1 to 1000 frames per second is needed; got {text!r}")
-    return value
-
-
-def as_seconds(text: str) -> float:
-    """Seconds, 0 or more."""
-    try:
-        value = _number(text)
-    except ValueError:
-        value = -1.0
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"a number of seconds, 0 or more, is needed; got {text!r}")
     return value
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from motionloom.cli.newcomers import one_sentence, suggestion, with_options
+from motionloom.cli.options import add_options
 from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.cli.writing import add_writing, check_rate, check_unit
@@ -15,6 +16,7 @@ from motionloom.formats import writable
 from motionloom.requests.fields import specs
 from motionloom.requests.generate import Generate
 from motionloom.requests.reading import make
+from motionloom.requests.shared import Adapted
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -83,14 +85,9 @@ def results(label: str, plan: "Plan", models: "Models") -> "Iterator[Result]":
 
 
 def add_adapters(parser: argparse.ArgumentParser) -> None:
-    """``--adapter``: what was taught from clips."""
-    parser.add_argument(
-        "--adapter",
-        action="append",
-        default=[],
-        metavar="FILE[:FACTOR]",
-        help="what 'motionloom teach' made of clips, repeatable; a factor says how much of it (default 1)",
-    )
+    """``--adapter``, once: what was taught from clips."""
+    if "--adapter" not in parser._option_string_actions:
+        add_options(parser, Adapted)
 
 
 def load_prior(arguments: argparse.Namespace) -> "Prior":

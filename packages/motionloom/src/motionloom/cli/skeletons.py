@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_robot
-from motionloom.formats import readable
+from motionloom.formats import characters, find, readable
+from motionloom.requests.export import OnSkeleton
 
 if TYPE_CHECKING:
     from motionloom.ground import GroundPose
@@ -21,12 +23,6 @@ if TYPE_CHECKING:
     from motionloom.retarget.hands import HandPose
     from motionloom.skeleton import Skeleton
 
-CHARACTERS = (".glb", ".vrm", ".gltf", ".fbx")
-"""Files with a mesh, which is written with its motion."""
-ROOTS = ("motion", "hips", "in-place")
-PLACES = ("character", "origin")
-HANDS = ("relaxed", "fist", "flat", "as-is")
-
 
 def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
     """``--skeleton`` and what goes with it; ``own`` is whose skeleton motions have without it, in words."""
@@ -36,21 +32,7 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
         help="put motions on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is "
         f"written as that file with one more animation (default: {own})",
     )
-    parser.add_argument(
-        "--root",
-        choices=ROOTS,
-        help="what carries the way over the ground on a skeleton with a root bone: that bone (motion, the default), "
-        "the hips, or nothing",
-    )
-    parser.add_argument(
-        "--hands", choices=HANDS, help="pose of the hands on a skeleton with fingers (default as-is: its rest pose)"
-    )
-    parser.add_argument(
-        "--at",
-        choices=PLACES,
-        help="where motions of a .glb, .gltf or .vrm character start: where it stands and faces (character, the "
-        "default of one that stands elsewhere), or at the origin, facing +Z",
-    )
+    add_options(parser, OnSkeleton, "root", "hands", "at")
     parser.add_argument(
         "--clip-name",
         metavar="NAME",
@@ -72,7 +54,7 @@ class Target:
     orders: dict[str, str] = field(default_factory=dict)
     character: "Character | None" = None
     at: str | None = None
-    """Where motions start: one of `PLACES`; None: where the character stands, if that is elsewhere than the origin."""
+    """Where motions start: character or origin; None: where the character stands, if that is not the origin."""
     root: "RootMode" = "motion"
     hands: "HandPose" = "as-is"
     joint_map: Path | None = None
@@ -81,8 +63,6 @@ class Target:
     replace: bool = False
     one_file: bool = False
     """Whether several motions become animations of one file."""
-    kept: object = None
-    """What must stay as long as the character does: a folder with what an FBX became."""
 
     def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
         """The motion on this skeleton, where the character stands; ``source`` names it in an error."""
@@ -262,7 +242,7 @@ def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> 
     if arguments.robot is not None:
         return [Path(name + ".csv")]
     own = Path(arguments.skeleton or "").suffix.lower()
-    return [Path(name + (own if own in CHARACTERS else suffix))]
+    return [Path(name + (own if own in characters() else suffix))]
 
 
 def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
@@ -323,7 +303,7 @@ def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None
     source = next((getattr(arguments, name) for name in ("inputs", "clip", "past") if hasattr(arguments, name)), None)
     source = source[0] if isinstance(source, list) else source
     bodies = [out for out in outs if out.suffix.lower() in (".glb", ".usda", ".fbx")]
-    if not isinstance(source, Path) or source.suffix.lower() not in CHARACTERS[:3] or not bodies:
+    if not isinstance(source, Path) or source.suffix.lower() not in characters(alone=True) or not bodies:
         return
     from motionloom.io.gltf_read import open_glb
 
@@ -382,24 +362,9 @@ def _find(arguments: argparse.Namespace) -> Target:
         from motionloom.io.asf import load_skeleton
 
         return Target(name, load_skeleton(path), **options)
-    if suffix in io.GLTF and suffix != ".vrma":
-        from motionloom.io.character import load_character
-
-        character = load_character(path, joint_map=arguments.target_map)
+    if find(path).character:
+        character = io.open_character(path, joint_map=arguments.target_map)
         return Target(name, character.skeleton, character=character, **options)
-    if suffix == ".fbx":
-        import tempfile
-
-        from motionloom.io.blender import fbx_to_glb
-        from motionloom.io.character import load_character
-
-        folder = tempfile.TemporaryDirectory()
-        made = fbx_to_glb(path, Path(folder.name))
-        try:
-            character = load_character(made, joint_map=arguments.target_map)
-        except MotionloomError as error:
-            raise MotionloomError(str(error).replace(str(made), str(path))) from None
-        return Target(name, character.skeleton, character=character, kept=folder, **options)
     if suffix not in readable():
         raise MotionloomError(
             f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(readable())}); got {name!r}"

@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from motionloom.errors import MotionloomError
+from motionloom.requests.fields import specs
+from motionloom.requests.shared import Adapted
 
 MOST_FACTOR = 4.0
-MOST_ADAPTERS = 16
+MOST_ADAPTERS = specs(Adapted)["adapter"].many
 """Adapters that are merged at once."""
 
 Applied: TypeAlias = tuple[Any, float]

@@ -4,12 +4,13 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any, NoReturn
 
 from motionloom.errors import MotionloomError, kind_of, listed, meant, quoted
 from motionloom.io.lined_yaml import read_lined
+from motionloom.requests.fields import Spec
 
 
 @dataclass(frozen=True)
@@ -40,13 +41,15 @@ class Field:
         self.fail(f"must be {wanted}; got {kind_of(self.value)}")
 
     def mapping(self, known: Collection[str], needed: Collection[str] = ()) -> dict[str, "Field"]:
-        """The values by key; no key but ``known`` ones, and all that are ``needed``."""
+        """The values by key; no key but ``known`` ones, and all that are ``needed`` (fields say it themselves)."""
         if not isinstance(self.value, Mapping):
             self.wrong(f"a mapping with {listed(known)}")
         for key in self.value:
             if key not in known:
                 word = str(key)
                 self.fail(f"has the unknown key {quoted(word)}{meant(word, known)}; it may have {listed(known)}")
+        if isinstance(known, Mapping):
+            needed = [key for key, spec in known.items() if spec.needed]
         for key in needed:
             if key not in self.value:
                 self.fail(f"has no '{key}'; it needs {listed(needed)}")
@@ -78,6 +81,16 @@ class Field:
     def numbers(self, low: float, high: float, *, least: int = 1, most: int = 100_000) -> list[float]:
         """A list of finite numbers."""
         return [item.number(low, high) for item in self.items(least=least, most=most)]
+
+    def read(self, spec: Spec) -> Any:
+        """The value, or the list of values, as a field holds it."""
+        if spec.many:
+            return [item.read(replace(spec, many=0)) for item in self.items(most=spec.many)]
+        if spec.size:
+            return tuple(self.numbers(spec.low, spec.high, least=spec.size, most=spec.size))
+        if spec.kind == "number":
+            return self.number(spec.low, spec.high)
+        return self.flag() if spec.kind == "flag" else self.word(spec.words)
 
     def flag(self) -> bool:
         """True or false."""
@@ -114,3 +127,9 @@ class Field:
         if not there:
             self.fail(f"names {quoted(said, 200)}, and there is no such file in {folder}")
         return place
+
+
+def value(given: Mapping[str, Field], keys: Mapping[str, Spec], name: str) -> Any:
+    """What is given for a key, as its field holds it; the field's default where nothing is."""
+    found = given.get(name)
+    return keys[name].default if found is None else found.read(keys[name])

@@ -1,7 +1,7 @@
 """Goal files: what control asks, as JSON that says key by key what is wrong with it.
 
-`docs/control.md` explains the keys, `motionloom control --schema` prints them as a JSON Schema
-(`packages/motionloom/src/motionloom/schemas/goal.schema.json`).
+`docs/control.md` explains the keys, `motionloom.requests.goal` lists them, `motionloom control --schema` prints them as
+a JSON Schema.
 """
 
 import json
@@ -16,39 +16,24 @@ import numpy as np
 from motionloom.errors import MotionloomError, listed
 from motionloom.features.humanml import resample_positions
 from motionloom.goals.drawing import read_drawing
-from motionloom.goals.fields import Field
+from motionloom.goals.fields import Field, value
 from motionloom.goals.following import follow, tracks
 from motionloom.goals.goal import FPS, Goal, merged, start_of, turn_between
-from motionloom.goals.paths import CURVES, WALKING, curve, lengths_along, root_path, through, turned_to
+from motionloom.goals.paths import WALKING, curve, lengths_along, root_path, through, turned_to
 from motionloom.goals.reach import check_reach
+from motionloom.goals.schemas import GOAL_JOINTS
 from motionloom.ground import GroundPose
 from motionloom.io import load
 from motionloom.io.text import read_text
 from motionloom.motion import ground_pose
+from motionloom.requests import goal as keys
+from motionloom.requests.goal import FARTHEST, MAX_FRAMES
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 
-__all__ = ["SCHEMA", "follow", "read_goal", "root_path"]
+__all__ = ["follow", "read_goal", "root_path"]
 
-SCHEMA = Path(__file__).parents[1] / "schemas" / "goal.schema.json"
 MAX_BYTES = 16_000_000
-MAX_FRAMES = 1_000_000
-FARTHEST = 1000.0
-"""Metres from the origin."""
-FULL_TURN = 36_000.0
-"""Degrees: directions count on beyond a turn, so far."""
-KEYS = ("start", "path", "joints", "poses", "follow")
-START_KEYS = ("position", "facing")
-PATH_KEYS = {
-    "points": ("points", "times", "closed", "smooth", "facing"),
-    "svg": ("svg", "width", "scale", "times", "facing"),
-    "curve": ("curve", "size", "turn", "times", "facing"),
-}
-JOINT_KEYS = ("joint", "points", "every_frame", "curve", "frame")
-POINT_KEYS = ("time", "position")
-POSE_KEYS = ("time", "from", "at", "position", "facing")
-FOLLOW_KEYS = ("from", "joints", "from_time", "times")
-JOINTS = (*SMPL22.names, *SMPL22.groups)
 _TIE = 0.05
 """Metres that a path may begin beside the place where the person starts."""
 
@@ -125,9 +110,9 @@ class _Reader:
         return self.frames / self.fps
 
     def goal(self, top: Field) -> Goal:
-        given = top.mapping(KEYS)
+        given = top.mapping(keys.GOAL)
         if not given:
-            top.fail(f"asks for nothing; give it one or several of {listed(KEYS)}")
+            top.fail(f"asks for nothing; give it one or several of {listed(keys.GOAL)}")
         start = self.start(given["start"]) if "start" in given else _Start()
         goal, start = self.path(given["path"], start) if "path" in given else (Goal.nothing(self.frames), start)
         placed = start.position is not None or start.facing is not None
@@ -155,19 +140,10 @@ class _Reader:
             item.fail(f"cannot be had with the rest: {error}")
 
     def start(self, found: Field) -> _Start:
-        given = found.mapping(START_KEYS)
+        given = found.mapping(keys.START)
         if not given:
-            found.fail(f"says nothing; give it one or both of {listed(START_KEYS)}")
-        return _Start(self.ground(given.get("position")), self.direction(given.get("facing")))
-
-    def ground(self, found: Field | None) -> tuple[float, float] | None:
-        if found is None:
-            return None
-        x, z = found.numbers(-FARTHEST, FARTHEST, least=2, most=2)
-        return x, z
-
-    def direction(self, found: Field | None) -> float | None:
-        return None if found is None else float(np.radians(found.number(-FULL_TURN, FULL_TURN)))
+            found.fail(f"says nothing; give it one or both of {listed(keys.START)}")
+        return _Start(value(given, keys.START, "position"), _radians(value(given, keys.START, "facing")))
 
     def times(self, found: Field | None, count: int | None = None) -> list[float] | None:
         """Rising seconds within the motion."""
@@ -187,17 +163,17 @@ class _Reader:
     # -- the path
 
     def path(self, found: Field, start: _Start) -> tuple[Goal, _Start]:
-        kinds = [key for key in PATH_KEYS if isinstance(found.value, Mapping) and key in found.value]
+        kinds = [key for key in keys.PATHS if isinstance(found.value, Mapping) and key in found.value]
         if len(kinds) != 1:
-            found.mapping(sorted({key for keys in PATH_KEYS.values() for key in keys}))
-            found.fail(f"must have one of {listed(list(PATH_KEYS))}; got {listed(kinds) if kinds else 'none'}")
-        given = found.mapping(PATH_KEYS[kinds[0]], [kinds[0], *(["size"] if kinds[0] == "curve" else [])])
+            found.mapping(sorted({key for path in keys.PATHS.values() for key in path}))
+            found.fail(f"must have one of {listed(list(keys.PATHS))}; got {listed(kinds) if kinds else 'none'}")
+        given = found.mapping(keys.PATHS[kinds[0]])
         points, times, span = self.points(given) if "points" in given else self.drawn(found, given, start)
         facing = self.facing(given.get("facing"), len(points) if "points" in given else None)
         if isinstance(facing, list) and "points" not in given:
             times = None
             facing = np.interp(np.linspace(0, 1, len(points)), np.linspace(0, 1, len(facing)), facing).tolist()
-        smooth = given["smooth"].flag() if "smooth" in given else True
+        smooth = value(given, keys.PATHS["points"], "smooth")
         try:
             goal = root_path(
                 points,
@@ -214,9 +190,10 @@ class _Reader:
 
     def points(self, given: dict[str, Field]):
         """Points (n, 2), their times or None, and no span."""
-        places = [self.ground(item) for item in given["points"].items()]
+        known = keys.PATHS["points"]
+        places = value(given, known, "points")
         count = len(places)
-        if "closed" in given and given["closed"].flag():
+        if value(given, known, "closed"):
             if places[0] != places[-1] or count == 1:
                 places.append(places[0])
             count = len(places)
@@ -228,8 +205,8 @@ class _Reader:
             points = read_drawing(given["svg"].file(self.folder))
             points = points * self.metres(found, given, points)
         else:
-            turn = given["turn"].word(("left", "right")) if "turn" in given else "left"
-            points = curve(given["curve"].word(CURVES), given["size"].number(0.01, FARTHEST), turn=turn)
+            name, size, turn = (value(given, keys.PATHS["curve"], key) for key in ("curve", "size", "turn"))
+            points = curve(name, size, turn=turn)
             points = turned_to(points, start.facing or 0.0)
         points = points + (start.position or (0.0, 0.0))
         if np.abs(points).max() > FARTHEST:
@@ -242,14 +219,14 @@ class _Reader:
         if "width" in given and "scale" in given:
             found.fail("of a drawing has 'width' or 'scale', not both")
         if "scale" in given:
-            return given["scale"].number(1e-6, 1e6)
+            return value(given, keys.PATHS["svg"], "scale")
         if "width" not in given:
             begin, end = self.times(given.get("times"), 2) or (0.0, self.seconds)
             return self.metre * WALKING * (end - begin) / float(lengths_along(points)[-1])
         across = float(np.ptp(points[:, 0]))
         if across < 1e-6 * np.ptp(points[:, 1]):
             given["width"].fail("cannot be that of a drawing that goes straight up or down; give 'scale' instead")
-        return given["width"].number(0.01, FARTHEST) / across
+        return value(given, keys.PATHS["svg"], "width") / across
 
     def facing(self, found: Field | None, count: int | None) -> str | float | list[float]:
         if found is None:
@@ -257,8 +234,8 @@ class _Reader:
         if isinstance(found.value, str):
             return found.word(("along", "free"))
         if not isinstance(found.value, list | tuple):
-            return found.number(-FULL_TURN, FULL_TURN)
-        degrees = found.numbers(-FULL_TURN, FULL_TURN)
+            return found.read(keys.START["facing"])
+        degrees = found.read(keys.DIRECTIONS)
         if count is not None and len(degrees) not in (1, count):
             found.fail(f"has {len(degrees)} directions for {count} points; give one per point")
         return degrees[0] if len(degrees) == 1 else degrees
@@ -286,8 +263,8 @@ class _Reader:
     # -- joints
 
     def joint(self, item: Field, goal: Goal) -> Goal:
-        given = item.mapping(JOINT_KEYS, ["joint"])
-        joints = list(SMPL22.resolve([given["joint"].word(JOINTS)]))
+        given = item.mapping(keys.JOINT)
+        joints = list(SMPL22.resolve([given["joint"].word(GOAL_JOINTS)]))
         if ("points" in given) == ("every_frame" in given):
             item.fail("needs one of 'points' and 'every_frame'")
         if "every_frame" in given:
@@ -301,7 +278,7 @@ class _Reader:
             found = self.timed(given)
         frames, fields, places, asked = (list(part) for part in zip(*found, strict=True))
         places, asked = np.array(places), np.array(asked)
-        if "frame" in given and given["frame"].word(("world", "root")) == "root":
+        if value(given, keys.JOINT, "frame") == "root":
             places = self.from_root(goal, frames, fields, places, asked)
         result = Goal.nothing(self.frames)
         for joint in joints:
@@ -310,7 +287,7 @@ class _Reader:
 
     def timed(self, given: dict[str, Field]) -> list[tuple[int, Field, np.ndarray, np.ndarray]]:
         """(frame, field, place, asked) of points with times; of all frames between them if they are a curve."""
-        rows = [(row, row.mapping(POINT_KEYS, POINT_KEYS)) for row in given["points"].items()]
+        rows = [(row, row.mapping(keys.POINT)) for row in given["points"].items()]
         times = [point["time"].number(0.0, self.seconds) for _, point in rows]
         places = [self.place(point["position"]) for _, point in rows]
         frames = [self.frame(time) for time in times]
@@ -321,7 +298,7 @@ class _Reader:
                     f"got {times[number]:g}"
                 )
         fields = [row for row, _ in rows]
-        if not ("curve" in given and given["curve"].flag()):
+        if not value(given, keys.JOINT, "curve"):
             return [(f, row, *place) for f, row, place in zip(frames, fields, places, strict=True)]
         asked = places[0][1]
         if any((other != asked).any() for _, other in places):
@@ -372,7 +349,7 @@ class _Reader:
         return self.people[path]
 
     def pose(self, item: Field, goal: Goal, origin: GroundPose) -> Goal:
-        given = item.mapping(POSE_KEYS, ("time", "from"))
+        given = item.mapping(keys.POSE)
         frame = self.frame(given["time"].number(0.0, self.seconds))
         positions, fps = self.person(given["from"])
         length = len(positions) / fps
@@ -383,7 +360,7 @@ class _Reader:
             x, _, z = goal.positions[frame, 0]
             facing = goal.facing[frame] if goal.facing_asked[frame] else origin.facing
             place = GroundPose(float(x), float(z), float(facing))
-        position, facing = self.ground(given.get("position")), self.direction(given.get("facing"))
+        position, facing = value(given, keys.POSE, "position"), _radians(value(given, keys.POSE, "facing"))
         if position is not None:
             place = replace(place, x=position[0], z=position[1])
         if facing is not None:
@@ -394,8 +371,9 @@ class _Reader:
         return replace(result, start=place) if frame == 0 else result
 
     def follow(self, item: Field) -> Goal:
-        given = item.mapping(FOLLOW_KEYS, ("from", "joints"))
-        joints = SMPL22.resolve([name.word(JOINTS) for name in given["joints"].items(most=100)])
+        given = item.mapping(keys.FOLLOW)
+        named = given["joints"].items(most=keys.FOLLOW["joints"].many)
+        joints = SMPL22.resolve([name.word(GOAL_JOINTS) for name in named])
         positions, fps = self.person(given["from"])
         positions = resample_positions(positions, fps)
         since = given["from_time"].number(0.0, (len(positions) - 1) / FPS) if "from_time" in given else 0.0
@@ -409,4 +387,8 @@ class _Reader:
 def _one_or_many(found: Field | None) -> list[Field]:
     if found is None:
         return []
-    return [found] if isinstance(found.value, Mapping) else found.items(most=100)
+    return [found] if isinstance(found.value, Mapping) else found.items(most=keys.MOST_FOLLOWED)
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else float(np.radians(degrees))

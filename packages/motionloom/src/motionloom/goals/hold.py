@@ -26,7 +26,3 @@ class FixedJoints:
     parts: tuple[FixedPart, ...]
     align: bool = True
     """Whether a source that starts elsewhere is moved and turned on the ground to where the past ends."""
-
-
-Hold, HeldPart = FixedJoints, FixedPart
-"""Old names, for one release."""

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
-from motionloom.errors import MotionloomError, kind_of, listed, meant
+from motionloom.errors import MotionloomError, listed, meant
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, fail
 from motionloom.io.text import shown
-from motionloom.requests.fields import specs
+from motionloom.requests.fields import Spec
 
 
 @dataclass(frozen=True)
@@ -37,24 +37,12 @@ class LinedFile:
             self.fail(found.line, f"'{name}' has {len(found.value):,} entries; at most {most:,} are read")
         return found.value
 
-    def number(self, found: Lined | None, name: str, *, low: float, high: float, unit: str = "") -> float | None:
-        """A number from ``low`` to ``high``, None where nothing is written; it keeps its type."""
-        if found is None:
-            return None
-        value = found.value
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            kind = f"a number of {unit}" if unit else "a number"
-            self.fail(found.line, f"'{name}' must be {kind}; got {self.got(found)}")
-        if not low <= value <= high:
-            self.fail(found.line, f"'{name}' must be {low:g} to {f'{high:g} {unit}'.strip()}; got {kind_of(value)}")
-        return value
-
-    def field(self, given: Mapping[str, Lined], keys: type, name: str) -> Any:
-        """The value of one of the keys that a request of `motionloom.requests` names; None where nothing is written."""
+    def field(self, given: Mapping[str, Lined], keys: Mapping[str, Spec], name: str) -> Any:
+        """The value of one of the keys, as its field holds it; None where nothing is written."""
         if (found := given.get(name)) is None:
             return None
         try:
-            return specs(keys)[name].check(found.plain(), repr(name))
+            return keys[name].check(found.plain(), repr(name))
         except MotionloomError as error:
             self.fail(found.line, str(error))
 

@@ -1,7 +1,7 @@
-"""Mask files: which parts of a predicted person move as in another motion and when, line by line what is wrong with it.
+"""Mask files: which parts of a predicted person move as in another motion and when; mistakes name the line.
 
-`docs/predict.md` explains the keys, `motionloom predict --schema` prints them as a JSON Schema
-(`packages/motionloom/src/motionloom/schemas/mask.schema.json`). JSON is YAML, so both are read.
+`docs/predict.md` explains the keys, `motionloom.requests.mask` lists them, `motionloom predict --schema` prints
+them as a JSON Schema. JSON is YAML, so both are read.
 """
 
 from __future__ import annotations
@@ -14,22 +14,15 @@ from typing import TYPE_CHECKING
 
 from motionloom.errors import MotionloomError, meant
 from motionloom.goals.lined_file import LinedFile
+from motionloom.goals.schemas import MASK_JOINTS
 from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.io.text import shown
+from motionloom.requests.mask import MASK, MAX_FRAME, PART
 from motionloom.skeleton import SMPL22
 
 if TYPE_CHECKING:
     from motionloom.goals.hold import FixedPart
 
-SCHEMA = Path(__file__).parents[1] / "schemas" / "mask.schema.json"
-KEYS = ("hold",)
-PART_KEYS = ("joints", "from", "to", "frames")
-JOINTS = ("root", *SMPL22.groups, *SMPL22.names)
-"""What can be held: the root's way through the world, groups and joints of the 22."""
-LONGEST = 86_400.0
-"""Seconds."""
-MAX_PARTS, MAX_NAMES, MAX_SPANS = 1000, 100, 100_000
-MAX_FRAME = 100_000_000
 MAX_BYTES = 4_000_000
 BESIDE = 0.25
 """Of a frame: so far behind a frame a stretch of frames ends, and the next one may begin."""
@@ -48,7 +41,7 @@ def check_names(names: Iterable[str]) -> tuple[str, ...]:
     """The names, if all are of joints, groups or the root; raises `MotionloomError` that lists what there is."""
     found = tuple(names)
     if not found:
-        raise MotionloomError(f"no joint is named; there are {', '.join(JOINTS)}")
+        raise MotionloomError(f"no joint is named; there are {', '.join(MASK_JOINTS)}")
     for name in found:
         if problem := _name_problem(name):
             raise MotionloomError(problem)
@@ -75,9 +68,9 @@ def _reach(spans: list[tuple[float, float]]) -> float:
 
 
 def _name_problem(name: str) -> str:
-    if name in JOINTS:
+    if name in MASK_JOINTS:
         return ""
-    return f"no joint or group is called {shown(name)}{meant(name, JOINTS)}; there are {', '.join(JOINTS)}"
+    return f"no joint or group is called {shown(name)}{meant(name, MASK_JOINTS)}; there are {', '.join(MASK_JOINTS)}"
 
 
 @dataclass(frozen=True)
@@ -85,25 +78,25 @@ class _Reader(LinedFile):
     fps: float
 
     def parts(self, document: Lined) -> tuple[FixedPart, ...]:
-        top = self.mapping(document, KEYS, "a mask")
+        top = self.mapping(document, tuple(MASK), "a mask")
         if "hold" not in top:
             self.fail(document.line, "there is no 'hold'; list the parts that are held")
-        return tuple(self.part(item) for item in self.items(top["hold"], "hold", most=MAX_PARTS))
+        return tuple(self.part(item) for item in self.items(top["hold"], "hold", most=MASK["hold"].many))
 
     def part(self, item: Lined) -> FixedPart:
         from motionloom.goals.hold import FixedPart
 
-        given = self.mapping(item, PART_KEYS, "a held part")
+        given = self.mapping(item, tuple(PART), "a held part")
         if "joints" not in given:
             self.fail(item.line, "a held part has no 'joints'; name joints, groups or root")
-        names = tuple(self.joint(one) for one in self.items(given["joints"], "joints", most=MAX_NAMES))
+        names = tuple(self.joint(one) for one in self.items(given["joints"], "joints", most=PART["joints"].many))
         if "frames" in given:
             if "from" in given or "to" in given:
                 self.fail(given["frames"].key_line, "a held part has either 'frames' or 'from' and 'to', not both")
-            rows = self.items(given["frames"], "frames", most=MAX_SPANS)
+            rows = self.items(given["frames"], "frames", most=PART["frames"].many)
             return FixedPart(names, tuple(self.stretch(row) for row in rows))
-        begin = self.seconds(given.get("from"), "from", 0.0)
-        end = self.seconds(given.get("to"), "to", math.inf)
+        begin, end = (self.field(given, PART, name) for name in ("from", "to"))
+        begin, end = begin or 0.0, math.inf if end is None else end
         if end <= begin:
             self.fail(given["to"].line, f"'to' must be after 'from', {begin:g} s; got {end:g}")
         return FixedPart(names, ((begin, end),))
@@ -129,7 +122,3 @@ class _Reader(LinedFile):
         if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_FRAME:
             self.fail(found.line, f"a frame is a whole number of 0 to {MAX_FRAME:,}; got {found.kind}")
         return value
-
-    def seconds(self, found: Lined | None, name: str, otherwise: float) -> float:
-        value = self.number(found, name, low=0, high=LONGEST, unit="seconds")
-        return otherwise if value is None else float(value)

@@ -13,6 +13,7 @@ from motionloom.blending import hermite
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import FPS, Goal, turn_between
 from motionloom.ground import turned
+from motionloom.requests.goal import CURVES
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,6 @@ TURNING = 5
 """Frames on either side over which the facing along a path is averaged: nobody turns at a corner within a frame."""
 _FINE = 32
 """Straight pieces per stretch of a smooth curve that is walked at even speed."""
-CURVES = ("line", "circle", "figure_eight", "s")
 
 
 def through(points: np.ndarray, times: np.ndarray, at: np.ndarray, *, smooth: bool = True) -> Array:

@@ -1,7 +1,7 @@
 """Timeline files: what happens when, as YAML that says line by line what is wrong with it.
 
-`docs/compose.md` explains the keys, `motionloom compose --schema` prints them as a JSON Schema
-(`packages/motionloom/src/motionloom/schemas/timeline.schema.json`).
+`docs/compose.md` explains the keys, `motionloom.requests.timeline` lists them, `motionloom compose --schema` prints
+them as a JSON Schema.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from motionloom.goals.segment import Segment
     from motionloom.goals.sequence import Part
 
-SCHEMA = Path(__file__).parents[1] / "schemas" / "timeline.schema.json"
 TRANSITION = 1.0
 """What two neighbours share where the file does not say."""
-SHORTEST = specs(SegmentKeys)["seconds"].low
+TIMELINE, SEGMENT = specs(TimelineKeys), specs(SegmentKeys)
+SHORTEST = SEGMENT["seconds"].low
 MAX_SEGMENTS = MAX_ITEMS
 MAX_GOAL_FRAMES = 1_000_000
 """Frames with targets in one timeline, 0.6 GB of them."""
@@ -129,8 +129,8 @@ def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition
     for number, text in enumerate(texts, start=1):
         if problem := _text_problem(text):
             raise MotionloomError(f"segment {number}: {problem}")
-    specs(SegmentKeys)["seconds"].check(seconds, "a segment's length")
-    least = specs(SegmentKeys)["transition"].low
+    SEGMENT["seconds"].check(seconds, "a segment's length")
+    least = SEGMENT["transition"].low
     if transition is not None and not least <= transition <= seconds / 2 + 1e-9:
         raise MotionloomError(
             f"a transition takes {least:g} s to half of a segment, {seconds / 2:g} s; got {transition:g}"
@@ -264,11 +264,11 @@ class _Reader(LinedFile):
     metre: float = 1.0
 
     def timeline(self, document: Lined) -> Timeline:
-        top = self.mapping(document, tuple(specs(TimelineKeys)), "a timeline")
+        top = self.mapping(document, tuple(TIMELINE), "a timeline")
         if "segments" not in top:
             self.fail(document.line, "there are no 'segments'; list what the person does, one after the other")
         rows = [self.row(item) for item in self.items(top["segments"], "segments", of="segment")]
-        shared = self.field(top, TimelineKeys, "transition")
+        shared = self.field(top, TIMELINE, "transition")
         transitions = self.transitions(rows, shared)
         total = sum(_frames(row.seconds) for row in rows)
         targets = sum(_frames(row.seconds) for row in rows if row.goals) + (total if "path" in top else 0)
@@ -278,8 +278,8 @@ class _Reader(LinedFile):
             )
         return Timeline(
             self.segments(rows, transitions),
-            self.field(top, TimelineKeys, "seed"),
-            self.field(top, TimelineKeys, "guidance"),
+            self.field(top, TIMELINE, "seed"),
+            self.field(top, TIMELINE, "guidance"),
             self.start(top.get("start")),
             self.goal(top["path"], "path", total) if "path" in top else None,
         )
@@ -287,19 +287,19 @@ class _Reader(LinedFile):
     def row(self, item: Lined) -> _Row:
         if isinstance(item.value, str):
             return _Row(item.line, self.text(item))
-        given = self.mapping(item, tuple(specs(SegmentKeys)), "a segment")
+        given = self.mapping(item, tuple(SEGMENT), "a segment")
         if "text" not in given:
             self.fail(item.line, "a segment has no 'text'; say in words what the person does")
         if "goal" in given and "goals" in given:
             self.fail(given["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
-        seconds = self.field(given, SegmentKeys, "seconds")
+        seconds = self.field(given, SEGMENT, "seconds")
         transition = given.get("transition")
         return _Row(
             item.line,
             self.text(given["text"]),
             SECONDS if seconds is None else seconds,
-            self.field(given, SegmentKeys, "guidance"),
-            self.field(given, SegmentKeys, "transition"),
+            self.field(given, SEGMENT, "guidance"),
+            self.field(given, SEGMENT, "transition"),
             transition.line if transition else 0,
             self.goals(given),
             self.adapters(given.get("adapters")),

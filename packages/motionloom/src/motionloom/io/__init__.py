@@ -75,6 +75,15 @@ def _checked(path: Path, fps: float | None, *, unit: float | None, asf: Path | s
     return found
 
 
+def open_character(path: Path | str, *, joint_map: Any = None) -> Any:
+    """The `Character` of a file; ``joint_map``: which joints are which. Raises `MotionloomError` if it holds none."""
+    path = Path(path)
+    found = formats.find(path)
+    if not found.character:
+        raise MotionloomError(f"{path} is no character; one ends in {', '.join(formats.characters())}")
+    return _call(found.character, path, joint_map=joint_map)
+
+
 def check_output(path: Path | str, *, own: str | None = None) -> Path:
     """The path, if `save` could write there; ask before long work. Raises `MotionloomError` otherwise.
 

@@ -35,7 +35,6 @@ from motionloom.retarget.topology import ancestors, below
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
-SUFFIXES = (".glb", ".vrm", ".gltf")
 _SAME_TURN = 1e-7
 """One minus the cosine of half a turn below which a bone counts as resting."""
 
@@ -49,6 +48,8 @@ class Character:
     nodes: list[Node]
     rig: Rig
     joints: JointMap
+    kept: object = None
+    """What must stay as long as the character does: a folder with what its file became."""
 
     @property
     def skeleton(self) -> Skeleton:

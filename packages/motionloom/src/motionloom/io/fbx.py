@@ -3,12 +3,15 @@
 import tempfile
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
 from motionloom.io.blender import fbx_to_glb, glb_to_fbx
+from motionloom.io.character import Character, load_character
 from motionloom.io.gltf import load_glb, save_glb
 from motionloom.motion import Motion
+from motionloom.retarget.joint_map import Override
 
 
 def load_fbx(path: Path, *, clip: int | str | None = None) -> Motion:
@@ -27,6 +30,16 @@ def load_fbx(path: Path, *, clip: int | str | None = None) -> Motion:
         if issubclass(one.category, UserWarning):
             warnings.warn(str(one.message).replace(str(made), str(path)), stacklevel=2)
     return motion
+
+
+def load_fbx_character(path: Path, *, joint_map: Override | None = None) -> Character:
+    """Read the humanoid of an FBX; errors as of `load_fbx`. What Blender made of it is there as long as it is."""
+    folder = tempfile.TemporaryDirectory()
+    made = fbx_to_glb(path, Path(folder.name))
+    try:
+        return replace(load_character(made, joint_map=joint_map), kept=folder)
+    except MotionloomError as error:
+        raise MotionloomError(str(error).replace(str(made), str(path))) from None
 
 
 def save_fbx(motions: Sequence[Motion], path: Path, *, names: Sequence[str] | None = None) -> Path:

@@ -14,7 +14,7 @@ command may name its ``person``, 1 or 2; without that it is for both.
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,10 +24,9 @@ from motionloom.goals.roles import prompts_of
 from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.live.commands import Command, Say, from_json, person_of, to_json
 from motionloom.live.live import Frame, Stage
-from motionloom.requests.sampling import LARGEST_SEED
+from motionloom.requests.fields import specs
+from motionloom.requests.live import ScriptKeys, TimedKeys
 
-LONGEST = 3600.0
-"""Seconds of a session that is written to files."""
 MOST = 10_000
 """Commands of a script."""
 MAX_BYTES = 4_000_000
@@ -97,26 +96,23 @@ def _whole(pair: re.Match[str]) -> str:
 @dataclass(frozen=True)
 class _Reader(LinedFile):
     def script(self, found: Lined) -> Script:
-        parts = self.mapping(found, ("seconds", "seed", "people", "commands"), "a live script")
-        seconds = self.number(parts.get("seconds"), "seconds", low=0.05, high=LONGEST, unit="seconds")
+        keys = specs(ScriptKeys)
+        parts = self.mapping(found, tuple(keys), "a live script")
+        seconds, seed, people = (self.field(parts, keys, name) for name in ("seconds", "seed", "people"))
         if seconds is None:
             self.fail(found.line, "a live script says how long it is: give 'seconds'")
-        seed = self.number(parts.get("seed"), "seed", low=0, high=LARGEST_SEED - 1)
-        if seed is not None and not isinstance(seed, int):
-            self.fail(parts["seed"].line, f"'seed' must be a whole number; got {seed:g}")
-        people = self.number(parts.get("people"), "people", low=1, high=2)
-        if people is not None and not isinstance(people, int):
-            self.fail(parts["people"].line, f"'people' must be 1 or 2; got {people:g}")
         listed = parts.get("commands")
         entries: Sequence[Lined] = []
         if listed is not None and listed.value != []:
             entries = self.items(listed, "commands", of="command", most=MOST)
         commands = sorted((self._command(entry, people or 1) for entry in entries), key=lambda one: one.at)
-        return Script(float(seconds), tuple(commands), int(seed or 0), people or 1)
+        return Script(seconds, tuple(commands), seed or 0, people or 1)
 
     def _command(self, entry: Lined, people: int) -> Timed:
-        parts = self.mapping(entry, ("at", "person", *_TYPES), "a command")
-        at = self.number(parts.get("at"), "at", low=0, high=LONGEST, unit="seconds")
+        keys = dict(specs(TimedKeys))
+        keys["person"] = replace(keys["person"], high=people)
+        parts = self.mapping(entry, (*keys, *_TYPES), "a command")
+        at = self.field(parts, keys, "at")
         kinds = [kind for kind in _TYPES if kind in parts]
         if at is None or len(kinds) != 1:
             self.fail(entry.line, f"a command has a time 'at' and one of {', '.join(_TYPES)}")
@@ -125,12 +121,11 @@ class _Reader(LinedFile):
         fields = {"text": said} if kinds[0] == "say" else {} if said is None else said
         if not isinstance(fields, dict):
             self.fail(value.line, f"'{kinds[0]}' must be a mapping; got {self.got(value)}")
-        person = self.number(parts.get("person"), "person", low=1, high=people)
-        whom = person_of({"person": person})
+        whom = person_of({"person": self.field(parts, keys, "person")})
         try:
             command = from_json({**fields, "type": kinds[0]})
             if isinstance(command, Say) and people > 1 and whom is None:
                 prompts_of(command.text)
-            return Timed(float(at), command, whom)
+            return Timed(at, command, whom)
         except MotionloomError as error:
             self.fail(value.line, str(error))

@@ -1,7 +1,7 @@
 """One window of a live motion: its first frames are known, the rest is sampled in a few steps.
 
-The walk is that of every other motion (`diffusion.sampling`), what is known is held as in `tasks.redraw`, and the
-noise belongs to the numbers of frames: a frame that is sampled again, because something was asked, has the same noise.
+It is sampled as every other motion is (`tasks.sampling`), with what is known observed; the noise belongs to the numbers
+of frames: a frame that is sampled again, because something was asked, has the same noise.
 """
 
 from collections import OrderedDict
@@ -9,25 +9,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motionloom.diffusion import (
-    SOLVERS,
-    Denoiser,
-    NoiseSource,
-    generator,
-    guide,
-    inpaint,
-    levels,
-    observe,
-    row_seed,
-    sample,
-)
+from motionloom.diffusion import Denoiser, NoiseSource, generator, guide, row_seed
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
 from motionloom.features import humanml
 from motionloom.live.settings import Settings
+from motionloom.requests.sampling import Sampling
 from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.long import lengthened
-from motionloom.tasks.watching import report
+from motionloom.tasks.sampling import Batch, Observed, Rows, sample
+from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
 TEXTS = 64
@@ -64,7 +55,8 @@ class Sampler:
         self.calls = 0
         """Guided calls of the network so far."""
         self._bound: OrderedDict[str, tuple[Bound, Bound]] = OrderedDict()
-        self._levels = levels(prior.schedule, settings.steps, spacing=settings.spacing)  # type: ignore[arg-type]
+        self._sampling = Sampling(steps=settings.steps, solver=settings.solver, spacing=settings.spacing)
+        self._levels = self._sampling.levels(prior.schedule)
 
     def __call__(
         self,
@@ -83,37 +75,33 @@ class Sampler:
         before it is made to leave the known frames without a jump; turns: the same behind that, for edits that jump
         nowhere.
         """
-        prior, count, spread = self.prior, len(known), self.prior.spread
-        given = lengthened(known, count + frames)[None]
+        prior, count, length = self.prior, len(known), len(known) + frames
+        given = lengthened(known, length)[None]
         mask = np.zeros(given.shape, np.bool_)
         mask[:, :count] = True
-        data = (given - prior.mean) / spread
-        changed = leaving(prior, known, frames, edits=edits, turns=turns)
-        free = self._guided(text, count + frames)
+        change = leaving(prior, known, frames, edits=edits, turns=turns)
 
-        def denoise(state: np.ndarray, level: int) -> np.ndarray:
-            self.calls += 1
-            return changed(inpaint(free, data, mask)(state, level)[0], level)[None]
+        def changed(denoise: Denoiser, batch: Batch) -> Denoiser:
+            def estimate(state: np.ndarray, level: int) -> np.ndarray:
+                self.calls += 1
+                return change(denoise(state, level)[0], level)[None]
+
+            return estimate
 
         def poses(clean: np.ndarray) -> np.ndarray:
-            features = (clean * spread + prior.mean).astype(np.float64)
+            features = (clean * prior.spread + prior.mean).astype(np.float64)
             return humanml.decode_positions(features[0])[None, None]
 
-        hold = observe(data, mask, prior.schedule, noise)
-        state = hold(noise(data), self._levels[0])
-        walk = sample(
-            denoise,
-            state,
-            levels=self._levels,
-            solver=SOLVERS[self.settings.solver],
-            schedule=prior.schedule,
-            noise=noise,
-            constrain=hold,
+        [(_, state)] = sample(
+            prior,
+            Rows([text], [length], [0], noise=lambda seeds: noise),
+            self._sampling,
+            guided=self._guided(text, length),
+            edits=[changed],
+            observed=Observed((given - prior.mean) / prior.spread, mask),
+            view=View(poses),
         )
-        for done, snapshot in enumerate(walk, start=1):
-            state = snapshot.state
-            report(done, len(self._levels) - 1, [0], lambda clean=snapshot.clean: poses(clean))
-        return np.where(mask, given, state * spread + prior.mean)[0].astype(np.float64)
+        return np.where(mask[0], given[0], state * prior.spread + prior.mean).astype(np.float64)
 
     def _guided(self, text: str, frames: int) -> Denoiser:
         """The prior's denoised estimate under a text; an empty one asks for nothing in particular. Guided early.

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from motionloom.requests.export import OnSkeleton
 from motionloom.requests.fields import declare, like
 from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import PairSampling, Sampling
@@ -40,4 +41,6 @@ class Batch(Finish, OnRobot):
     pair_guidance: float = like(PairSampling, "pair_guidance")
     literal: bool = like(Generate, "literal")
     best_of: int = like(Sampling, "best_of")
+    root: str | None = like(OnSkeleton, "root")
+    hands: str = like(OnSkeleton, "hands", default="as-is")
     variants: int | None = declare("whole", "motions per line of --prompts, of seeds 0 to N - 1", low=1)

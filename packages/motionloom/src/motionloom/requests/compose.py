@@ -5,11 +5,11 @@ from typing import Any
 
 from motionloom.requests.fields import declare, group, like
 from motionloom.requests.sampling import Sampling
-from motionloom.requests.shared import Finish
+from motionloom.requests.shared import Adapted, Finish
 
 
 @dataclass(frozen=True, kw_only=True)
-class Compose(Finish):
+class Compose(Finish, Adapted):
     """Make one long motion of several actions, one after the other, such as {"segments": ["a person
     walks", "a person sits"]}.
     """

@@ -5,11 +5,11 @@ from typing import Any
 
 from motionloom.requests.fields import declare, group
 from motionloom.requests.sampling import Sampling
-from motionloom.requests.shared import SAMPLED, Finish, prompt, seconds
+from motionloom.requests.shared import SAMPLED, Adapted, Finish, prompt, seconds
 
 
 @dataclass(frozen=True, kw_only=True)
-class Control(Finish):
+class Control(Finish, Adapted):
     """Make motion of one person that keeps to goals, such as {"path": {"points": [[0, 0], [1, 2], [0,
     4]]}} (x and z, metres).
     """

@@ -5,11 +5,11 @@ from typing import Any
 
 from motionloom.requests.fields import declare, group, like
 from motionloom.requests.sampling import PairSampling
-from motionloom.requests.shared import Finish, prompt, seconds
+from motionloom.requests.shared import Adapted, Finish, prompt, seconds
 
 
 @dataclass(frozen=True, kw_only=True)
-class Duet(Finish):
+class Duet(Finish, Adapted):
     """Make motion of two people, from words or around a motion that is there."""
 
     prompt: str | None = prompt("what the two do; 'what the first does :: what the second does'")

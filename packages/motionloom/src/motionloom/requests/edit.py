@@ -5,13 +5,13 @@ from typing import Any
 
 from motionloom.requests.fields import declare, group
 from motionloom.requests.sampling import Sampling
-from motionloom.requests.shared import LONGEST, SAMPLED, Finish, prompt
+from motionloom.requests.shared import LONGEST, SAMPLED, Adapted, Finish, prompt
 
 Span = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Edit(Finish):
+class Edit(Finish, Adapted):
     """Change a motion by words: some seconds, some joints, its end."""
 
     motion: Any = declare("motion", "the clip", needed=True)

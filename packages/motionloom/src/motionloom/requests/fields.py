@@ -14,7 +14,12 @@ from typing import Any, NoReturn, TypedDict, Unpack
 
 from motionloom.errors import MotionloomError, kind_of, meant
 
-_PARSERS: Mapping[str, Callable[[str], Any]] = {"whole": int, "number": float}
+_PARSERS: Mapping[str, Callable[[str], Any]] = {
+    "whole": int,
+    "number": float,
+    "flag": {"true": True, "false": False}.__getitem__,
+}
+UNBOUND = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +32,8 @@ class Spec:
     """One sentence, without its full stop."""
     default: Any = None
     needed: bool = False
-    low: float = -1e6
-    high: float = 1e6
+    low: float = -UNBOUND
+    high: float = UNBOUND
     """The largest number, or of a text the most characters."""
     above: bool = False
     """``low`` itself is too little."""
@@ -49,6 +54,8 @@ class Spec:
         low, high = (f"{bound:,}" if isinstance(bound, int) else f"{bound:,g}" for bound in (self.low, self.high))
         if self.kind == "whole":
             return f"a whole number from {low} to {high}"
+        if self.high == UNBOUND:
+            return f"{low} or more {self.unit}".rstrip()
         return f"{f'above {low} and at most {high}' if self.above else f'{low} to {high}'} {self.unit}".rstrip()
 
     def check(self, value: Any, place: str) -> Any:
@@ -64,7 +71,7 @@ class Spec:
     def parse(self, typed: str, place: str) -> Any:
         """The same of what somebody typed: one value, or one number of several."""
         value: Any = typed
-        with suppress(ValueError):
+        with suppress(ValueError, KeyError):
             value = _PARSERS.get(self.kind, str)(typed)
         return replace(self, size=0)._one(value, place)
 
@@ -73,7 +80,7 @@ class Spec:
             if not isinstance(value, list | tuple) or len(value) != self.size:
                 _wrong(place, f"must be a list of {self.size} numbers", value)
             return tuple(replace(self, size=0)._one(one, place) for one in value)
-        if self.kind in _PARSERS:
+        if self.kind in ("whole", "number"):
             return self._number(value, place)
         if self.kind == "flag" and not isinstance(value, bool):
             _wrong(place, "must be true or false", value)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 from motionloom.requests.fields import declare, group
 from motionloom.requests.sampling import Sampling
-from motionloom.requests.shared import SAMPLED, Finish, prompt, seconds
+from motionloom.requests.shared import SAMPLED, Adapted, Finish, prompt, seconds
 
 
 @dataclass(frozen=True, kw_only=True)
-class Generate(Finish):
+class Generate(Finish, Adapted):
     """Make motion of one person from a sentence, such as 'a person walks forward and waves'."""
 
     prompt: str = prompt(needed=True)

@@ -7,6 +7,9 @@ from motionloom.requests.fields import Checked, declare, like
 from motionloom.requests.sampling import Sampling
 from motionloom.requests.shared import Looping, OnRobot
 
+LONGEST_SCRIPT = 3600.0
+"""Seconds of a session that is written to files."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Hello(Checked):
@@ -20,6 +23,24 @@ class Hello(Checked):
     max_speed: float | None = like(OnRobot, "max_speed")
     avoid_collisions: bool | None = like(OnRobot, "avoid_collisions")
     session: str = declare("text", "the key that the welcome of a session gave, to go on with it", "", high=100)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScriptKeys(Checked):
+    """The keys of a script."""
+
+    seconds: float = declare("number", "how long it is", needed=True, low=0.05, high=LONGEST_SCRIPT, unit="seconds")
+    seed: int = like(Sampling, "seed", "the same seed makes the same motion")
+    people: int = like(Hello, "people")
+    commands: Any = declare("commands", "what is asked when", ())
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimedKeys(Checked):
+    """The keys of a command beside what it asks."""
+
+    at: float = declare("number", "when it is asked", needed=True, low=0, high=LONGEST_SCRIPT, unit="seconds")
+    person: int | None = declare("whole", "whom of two, 1 or 2; without it everybody", low=1, high=2)
 
 
 @dataclass(frozen=True, kw_only=True)

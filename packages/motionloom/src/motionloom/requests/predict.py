@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from motionloom.requests.fields import declare, group
+from motionloom.requests.fields import Checked, declare, group
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.requests.shared import Finish, seconds
 
@@ -17,6 +17,13 @@ class _Past(Finish):
     motion: Any = declare("motion", "what is gone on from", needed=True)
     start: float | None = declare("number", "begin at this second of it", low=0, unit="seconds")
     end: float | None = declare("number", "end at this second of it", low=0, unit="seconds")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held(Checked):
+    """A motion that parts of somebody's future are held to."""
+
+    from_time: float = declare("number", "the second of it at which the future begins", 0.0, low=0, unit="seconds")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,6 +58,11 @@ def read(
     return make(request, {name: known[name].check(value, place(name)) for name, value in given.items()})
 
 
+def typed(request: type, values: Mapping[str, str]) -> dict[str, Any]:
+    """Values of fields from text, such as what follows a ``?`` of an address."""
+    return {name: specs(request)[name].parse(value, repr(name)) for name, value in values.items()}
+
+
 def narrowed(request: type, most: Mapping[str, float]) -> Mapping[str, Spec]:
     """The fields of a request where a door takes less: ``most`` has largest numbers by name."""
     if not most:

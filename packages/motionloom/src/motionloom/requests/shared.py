@@ -45,6 +45,19 @@ class Looping(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Adapted(Checked):
+    """What was taught from clips, put into the prior."""
+
+    adapter: tuple[str, ...] = declare(
+        "text",
+        "what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it",
+        (),
+        high=LONGEST_PROMPT,
+        many=16,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class Finish(Looping):
     """What becomes of the whole."""
 

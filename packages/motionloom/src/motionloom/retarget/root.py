@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from motionloom.retarget.anatomy import Body
 from motionloom.retarget.topology import ancestors
 
 RootMode = Literal["motion", "hips", "in-place"]
-MODES: tuple[str, ...] = get_args(RootMode)
 LOW = 0.25
 """A root bone is at most so high above the soles, in heights of the pelvis."""
 

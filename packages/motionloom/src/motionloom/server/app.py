@@ -19,10 +19,12 @@ from starlette.routing import BaseRoute, Route
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
+from motionloom.requests.export import FORMATS, Export
+from motionloom.requests.fields import specs
+from motionloom.requests.reading import read, typed
 from motionloom.retarget.named import NAMED
 from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
-from motionloom.server.components import FORMATS
 from motionloom.server.guard import Door, Guard
 from motionloom.server.job_request import TASKS, read_request
 from motionloom.server.limits import Limits
@@ -134,6 +136,7 @@ async def capabilities(request: Request) -> Response:
             "limits": studio.limits.public(),
             "formats": list(FORMATS),
             "skeletons": list(NAMED),
+            "adapters": sorted(path.name for path in studio.project.adapters.glob("*.safetensors")),
         }
         | await capabilities_of(request.app)
     )
@@ -215,22 +218,10 @@ async def motion(request: Request) -> Response:
         return JSONResponse(about)
     if kind not in FORMATS:
         raise Refusal(404, f"motions are given as {', '.join(FORMATS)}; got {kind[:20]!r}")
-    person, skeleton, root = _person(request), *map(request.query_params.get, ("skeleton", "root"))
-
-    def made() -> Path:
-        return files.export(studio.project, stored, kind, skeleton=skeleton, person=person, root=root)
-
-    part = await _with_file(studio, made)
+    known = {key: value for key, value in request.query_params.items() if key in specs(Export)}
+    asked = read(Export, typed(Export, known) | {"motion": name, "format": kind}, "a file")
+    part = await _with_file(studio, lambda: files.export(studio.project, asked))
     return file_once(part, media_type=files.FORMATS[kind], name=f"motion-{name[:8]}{part.suffix}")
-
-
-def _person(request: Request) -> int | None:
-    said = request.query_params.get("person")
-    if said is None:
-        return None
-    if said not in tuple("01234567"):
-        raise Refusal(400, f"a person is a number counted from 0; got {said[:20]!r}")
-    return int(said)
 
 
 async def upload_character(request: Request) -> Response:

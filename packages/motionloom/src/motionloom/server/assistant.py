@@ -8,6 +8,7 @@ import base64
 import inspect
 import json
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import version
@@ -16,8 +17,9 @@ from typing import Annotated, Any
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import Applied
-from motionloom.requests.fields import specs
-from motionloom.requests.reading import narrowed
+from motionloom.requests.export import Export
+from motionloom.requests.fields import Spec, specs
+from motionloom.requests.reading import narrowed, read
 from motionloom.requests.schema import Schema, schema
 from motionloom.requests.tasks import REQUESTS
 from motionloom.requests.timeline import SegmentKeys, TimelineKeys
@@ -28,13 +30,13 @@ from motionloom.server.refusal import Refusal
 from motionloom.server.worker import Worker
 
 CLIENT = "assistant"
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,80}")
 WHAT = (
     "Human motion from plain English, on a skeleton of 22 joints at 20 frames per second. Make motion with "
     "generate_motion (one action), compose (several, one after the other) or another task; write files with export. "
     "An answer says what happened in each motion, measured on its joints, and shows it: compare that with what was "
     "wanted, and try again with other words, goals or another seed. motionloom://actions lists what is known."
 )
-SCHEMAS = Path(__file__).parents[1] / "schemas"
 
 
 _GOALS: Schema = {
@@ -73,7 +75,6 @@ class Assistant:
 
     def tool(self, task: str) -> Callable[..., Any]:
         """What makes motion of a task's request, with its fields as arguments."""
-        from pydantic import WithJsonSchema
 
         async def call(**given: Any) -> Any:
             return await self._drawn({"task": task} | given)
@@ -81,52 +82,33 @@ class Assistant:
         known = narrowed(REQUESTS[task], most(task, self.worker.limits))
         call.__name__ = "generate_motion" if task == "generate" else task
         call.__doc__ = f"{inspect.getdoc(REQUESTS[task])} Answers what happened in each motion, and shows it."
-        call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [
-                inspect.Parameter(
-                    name,
-                    inspect.Parameter.KEYWORD_ONLY,
-                    default=inspect.Parameter.empty if spec.needed else None,
-                    annotation=Annotated[Any, WithJsonSchema(schema(spec, KINDS))],
-                )
-                for name, spec in sorted(known.items(), key=lambda one: not one[1].needed)
-            ],
-            return_annotation=list[dict[str, Any]],
-        )
+        call.__signature__ = _signature(known, list[dict[str, Any]])  # type: ignore[attr-defined]
         return call
 
-    async def export(
-        self,
-        motion: str,
-        format: str = "bvh",
-        skeleton: str | None = None,
-        name: str | None = None,
-        root: str | None = None,
-    ) -> dict[str, Any]:
-        """Write a motion to a file in the project folder and give its path.
-
-        motion: an id that another tool gave. format: bvh, glb, npz, mp4, png, or html, a page that plays it. skeleton:
-        smpl22, mixamo, unreal, vrm or rigify. root: what carries the way on a skeleton with a root bone: motion (that
-        bone), hips or in-place (nothing). name: of the file, letters, digits, - and _ only; without it the motion's id.
-        """
+    @property
+    def export(self) -> Callable[..., Any]:
+        """What writes a motion to a file, with the fields of `Export` as arguments."""
         import anyio
 
-        def write() -> dict[str, Any]:
-            from motionloom.server import files
+        async def export(**given: Any) -> Any:
+            return await _said(anyio.to_thread.run_sync(self._written, given))
 
-            if format not in files.FORMATS:
-                raise MotionloomError(f"motions are written as {', '.join(files.FORMATS)}; got {format[:20]!r}")
-            stem = motion if name is None else name
-            if not 0 < len(stem) <= 80 or not stem.replace("-", "").replace("_", "").isalnum() or not stem.isascii():
-                raise MotionloomError(f"a file's name has letters, digits, - and _ only; got {stem[:40]!r}")
-            stored = self.project.motion(motion)
-            part = files.export(self.project, stored, format, skeleton=skeleton, person=None, root=root)
-            place = self.project.folder / "exports" / f"{stem}.{format}"
-            place.parent.mkdir(exist_ok=True)
-            os.replace(part, place)
-            return {"file": str(place), "bytes": place.stat().st_size}
+        export.__doc__ = f"{inspect.getdoc(Export)} A motion is an id that another tool gave."
+        export.__signature__ = _signature(specs(Export), dict[str, Any])  # type: ignore[attr-defined]
+        return export
 
-        return await _said(anyio.to_thread.run_sync(write))
+    def _written(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        from motionloom.server import files
+
+        asked = read(Export, given, "export")
+        stem = asked.name or asked.motion
+        if not isinstance(stem, str) or not _NAME.fullmatch(stem):
+            raise MotionloomError(f"a file's name has letters, digits, - and _ only; got {str(stem)[:40]!r}")
+        part = files.export(self.project, asked)
+        place = self.project.folder / "exports" / f"{stem}.{asked.format}"
+        place.parent.mkdir(exist_ok=True)
+        os.replace(part, place)
+        return {"file": str(place), "bytes": place.stat().st_size}
 
     async def actions(self) -> str:
         """What the prior has learned: seconds of recordings for each action, and sentences that tell of them."""
@@ -138,7 +120,9 @@ class Assistant:
 
     def goal_schema(self) -> str:
         """The JSON Schema of goals."""
-        return (SCHEMAS / "goal.schema.json").read_text(encoding="utf-8")
+        from motionloom.goals.schemas import SCHEMAS
+
+        return SCHEMAS["goal"]()
 
     async def _drawn(self, asked: dict[str, Any]) -> Any:
         """The results of a job, as values, as text, and as a picture."""
@@ -171,6 +155,22 @@ class Assistant:
             return part.read_bytes()
         finally:
             part.unlink(missing_ok=True)
+
+
+def _signature(known: Mapping[str, Spec], gives: Any) -> inspect.Signature:
+    """That of a function which takes these fields by name."""
+    from pydantic import WithJsonSchema
+
+    arguments = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if spec.needed else None,
+            annotation=Annotated[Any, WithJsonSchema(schema(spec, KINDS))],
+        )
+        for name, spec in sorted(known.items(), key=lambda one: not one[1].needed)
+    ]
+    return inspect.Signature(arguments, return_annotation=gives)
 
 
 async def _said(call: Any) -> Any:

@@ -6,6 +6,7 @@ No object is described inside of another, so that no two classes of a client get
 from dataclasses import replace
 from typing import Any
 
+from motionloom.requests.export import FORMATS, OnSkeleton
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import narrowed
 from motionloom.requests.schema import Schema, schema
@@ -22,8 +23,6 @@ ID: Schema = {"type": "string", "pattern": "^[0-9a-f]{16}$"}
 FILE: Schema = {"type": "string", "format": "binary"}
 ANYTHING: Schema = {}
 _NULL: Schema = {"type": "null"}
-FORMATS = ("bvh", "glb", "npz", "mp4", "png", "html")
-"""Files that motions are given as."""
 _FLOATS = TEXT | {"description": "base64 of little-endian float32", "contentEncoding": "base64"}
 
 
@@ -61,6 +60,11 @@ def _object(properties: dict[str, Schema], *required: str, more: bool = True, ab
     return found | ({"description": about} if about else {})
 
 
+def _whole(properties: dict[str, Schema], *, about: str = "") -> Schema:
+    """An object that has all of these keys."""
+    return _object(properties, *properties, about=about)
+
+
 def request_of(task: str) -> str:
     """The name of a task's request, such as GenerateRequest."""
     return f"{task.title()}Request"
@@ -74,9 +78,10 @@ def components(limits: Limits) -> dict[str, Schema]:
 def _requests(limits: Limits) -> dict[str, Schema]:
     """Of every task, and of the words that fields of them may be, which are named after these fields."""
     found: dict[str, Schema] = {}
+    for request in (*REQUESTS.values(), OnSkeleton):
+        found |= {name.title(): {"enum": list(spec.words)} for name, spec in specs(request).items() if spec.words}
     for task, request in REQUESTS.items():
         fields = narrowed(request, most(task, limits))
-        found |= {name.title(): {"enum": list(spec.words)} for name, spec in fields.items() if spec.words}
         keys = {"task": {"const": task}, "levels": _levels(limits)}
         keys |= {name: ref(name.title()) if spec.words else schema(spec, KINDS) for name, spec in fields.items()}
         needed = [name for name, spec in fields.items() if spec.needed]
@@ -106,7 +111,7 @@ def _timelines() -> dict[str, Schema]:
 
 
 def _jobs() -> dict[str, Schema]:
-    result = _object(
+    result = _whole(
         {
             "id": ID,
             "number": WHOLE,
@@ -117,18 +122,9 @@ def _jobs() -> dict[str, Schema]:
             "measures": ref("Measures"),
             "happened": _list({"anyOf": [ref("Deeds"), _NULL]}, description="of each person"),
             "remarks": _list(TEXT, description="what was missed"),
-        },
-        "id",
-        "number",
-        "seed",
-        "seconds",
-        "frames",
-        "people",
-        "measures",
-        "happened",
-        "remarks",
+        }
     )
-    job = _object(
+    job = _whole(
         {
             "id": ID,
             "task": ref("Task"),
@@ -137,14 +133,7 @@ def _jobs() -> dict[str, Schema]:
             "error": {"anyOf": [TEXT, _NULL]},
             "remarks": _list(TEXT, description="how the words were read, and which of them nobody learned"),
             "results": _list(ref("Result")),
-        },
-        "id",
-        "task",
-        "state",
-        "progress",
-        "error",
-        "remarks",
-        "results",
+        }
     )
     return {
         "Task": {"enum": list(TASKS)},
@@ -165,7 +154,7 @@ def _deeds() -> Schema:
     keys = {"sentence": TEXT, **{name: _number() for name in numbers}}
     keys |= {"steps": _list(WHOLE), "pelvis": _list(_number()), "ends": TEXT}
     keys |= {"counts": ref("DeedCounts"), "contacts": ref("Contacts")}
-    return _object(keys, *keys, about="what a person did: metres, degrees (to the left), seconds (docs/files.md)")
+    return _whole(keys, about="what a person did: metres, degrees (to the left), seconds (docs/files.md)")
 
 
 def _stored() -> dict[str, Schema]:
@@ -200,7 +189,7 @@ def _stored() -> dict[str, Schema]:
 
 
 def _server() -> dict[str, Schema]:
-    lists = {key: _list(TEXT) for key in ("joints", "tasks", "formats", "skeletons")}
+    lists = {key: _list(TEXT) for key in ("joints", "tasks", "formats", "skeletons", "adapters")}
     capabilities = _object(
         {
             "fps": _number(),

@@ -15,7 +15,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.server.job_request import JobRequest
 from motionloom.tasks import run as tasks
 from motionloom.tasks import text
-from motionloom.tasks.run import Models, Plan, Result, run
+from motionloom.tasks.run import Models, Plan, Result, run, run_each
 from motionloom.tasks.sampling import Progress
 
 Array = NDArray[np.float64]
@@ -61,6 +61,7 @@ def plan_of(request: JobRequest) -> Plan:
         goals=goals,
         people=tuple(people),
         target=target,
+        taught=request.taught,
     )
 
 
@@ -69,7 +70,7 @@ def batch_key(request: JobRequest) -> tuple[Any, ...] | None:
     if request.task != "generate" or request.call is not None or request.timeline is not None:
         return None
     alike = replace(request.sampling, seed=0, count=1)
-    return text.frames_in(request.seconds, RATE), alike, request.values.foot_lock
+    return text.frames_in(request.seconds, RATE), alike, request.values.foot_lock, request.taught
 
 
 def at_once(request: JobRequest) -> bool:
@@ -82,21 +83,7 @@ def draw_together(models: Models, requests: Sequence[JobRequest], progress: Prog
 
     A motion depends on its prompt and its seed alone, up to the rounding of larger matrix products.
     """
-    rows = [(index, number) for index, request in enumerate(requests) for number in range(request.count)]
-    frames = text.frames_in(requests[0].seconds, models.prior.fps)
-    values = requests[0].values
-    made = text.sample_features(
-        models.prior,
-        [requests[index].prompt for index, _ in rows],
-        [frames] * len(rows),
-        seeds=[requests[index].seed + number for index, number in rows],
-        sampling=requests[0].sampling,
-        progress=progress,
-    )
-    for (index, number), features in zip(rows, made, strict=True):
-        motion = text.finish(models.prior, features, foot_lock=values.foot_lock)
-        request = requests[index]
-        yield index, tasks.closed(request, models, Result((motion,), number, request.seed + number))
+    return run_each([plan_of(request) for request in requests], models, progress)
 
 
 def cropped(motion: Motion, values: Any) -> Motion:

@@ -8,21 +8,23 @@ from typing import Any, cast
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.formats import readable
+from motionloom.formats import characters, readable
 from motionloom.goals.fields import Field
-from motionloom.io import load, load_scene, save, save_scene
-from motionloom.io.character import load_character
+from motionloom.io import load, load_scene, open_character, save, save_scene
 from motionloom.io.text import parse_json
 from motionloom.motion import Motion
-from motionloom.retarget import MODES, RootMode, joint_map, retarget, to_smpl22
+from motionloom.requests.export import Export
+from motionloom.retarget import RootMode, joint_map, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.stand import HERE, started
 from motionloom.retarget.toes import bend_toes
+from motionloom.server.drawing import cropped
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
-from motionloom.skeleton import SMPL22
+from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.viz.page import Take, write_page
 
 FORMATS = {
@@ -35,7 +37,7 @@ FORMATS = {
 }
 ONE_PERSON = ("bvh", "npz")
 UPLOADS = (*(suffix for suffix in readable() if suffix not in (".gltf", ".vrma")), ".json")
-SUFFIXES = (".glb", ".vrm", ".gltf", ".bvh")
+SUFFIXES = (*characters(alone=True), ".bvh")
 """Of characters."""
 
 
@@ -89,39 +91,48 @@ def _decoded(found: Field, width: int) -> np.ndarray:
     return values
 
 
-def export(
-    project: Project, stored: Stored, kind: str, *, skeleton: str | None, person: int | None, root: str | None = None
-) -> Path:
+def export(project: Project, asked: Export) -> Path:
     """A file of a motion in the project's temporary folder; whoever asks for it removes it.
 
-    kind: of `FORMATS`. skeleton: a name or the id of a character, which plays an html; None: the motion's own.
-    person: one of several, counted from 0; None: all. root: what carries the way over the ground, as ``--root``; None:
-    all joints above the hips go along. Raises `Refusal` and `MotionloomError` for what cannot be.
+    asked: the motion and a character by their ids; a character plays an html. Without a root all joints above the hips
+    go along. Raises `Refusal` and `MotionloomError` for what cannot be.
     """
-    if root is not None and (skeleton is None or root not in MODES):
-        raise Refusal(400, f"a root is one of {', '.join(MODES)}, for a skeleton that is named; got {root[:20]!r}")
-    mode = cast("RootMode | None", root)
-    people = list(stored.people)
-    if person is not None and not 0 <= person < len(people):
+    skeleton, person = asked.skeleton, asked.person
+    for name in ("root", "hands", "at"):
+        if getattr(asked, name) is not None and skeleton is None:
+            raise Refusal(400, f"'{name}' goes with a 'skeleton'; name one")
+    stored = project.motion(asked.motion)
+    people = [_stretch(one, asked) for one in stored.people]
+    if person is not None and person >= len(people):
         raise Refusal(400, f"the motion has {len(people)} people, counted from 0; there is no person {person}")
-    if person is not None or kind in ONE_PERSON:
+    if person is not None or asked.format in ONE_PERSON:
         people = [people[person or 0]]
     caption = str(stored.about.get("prompt") or stored.about.get("name") or "")
     if skeleton is not None and skeleton not in NAMED:
-        return _on_character(project, people, kind, skeleton, caption, mode)
+        return _on_character(project, people, skeleton, caption, asked)
     if skeleton is not None:
-        people = [retarget(one, named_skeleton(skeleton), root=mode) for one in people]
-    part = project.part(f".{kind}")
+        people = [_put(one, named_skeleton(skeleton), asked) for one in people]
+    part = project.part(f".{asked.format}")
     if len(people) > 1:
         return save_scene(people, part, names=_names(people), captions=[caption] * len(people))
     return save(people[0], part, captions=[caption])
 
 
-def _on_character(
-    project: Project, people: Sequence[Motion], kind: str, skeleton: str, caption: str, root: RootMode | None
-) -> Path:
+def _stretch(motion: Motion, asked: Export) -> Motion:
+    """The part that is asked, at the rate that is."""
+    motion = cropped(motion, asked)
+    motion = motion.mirror() if asked.mirror else motion
+    return motion if asked.fps is None else motion.resample(asked.fps)
+
+
+def _put(motion: Motion, skeleton: Skeleton, asked: Export) -> Motion:
+    moved = retarget(motion, skeleton, root=cast("RootMode | None", asked.root))
+    return pose_hands(moved, cast("HandPose", asked.hands or "as-is"))
+
+
+def _on_character(project: Project, people: Sequence[Motion], skeleton: str, caption: str, asked: Export) -> Path:
     path, _ = project.character(skeleton)
-    suffix, character = path.suffix, None
+    kind, suffix, character = asked.format, path.suffix, None
     if suffix == ".bvh":
         from motionloom.io.bvh import read_bvh
 
@@ -129,13 +140,13 @@ def _on_character(
     elif suffix == ".asf":
         raise MotionloomError("an ASF skeleton belongs to AMC files; put motions on a .glb, .vrm, .gltf or .bvh")
     else:
-        character = load_character(path)
+        character = open_character(path)
         target = character.skeleton
         if kind == "glb" and len(people) > 1:
             raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
     body = read_body(target)
-    moved = [bend_toes(retarget(one, target, root=root), body) for one in people]
-    if character is not None and character.stand != HERE and len(moved) == 1:
+    moved = [bend_toes(_put(one, target, asked), body) for one in people]
+    if character is not None and character.stand != HERE and len(moved) == 1 and asked.at != "origin":
         moved = [started(moved[0], body, character.stand)]
     if character is not None and kind == "glb":
         return character.save(moved[0], project.part(suffix), name=caption[:80] or None)
@@ -184,7 +195,7 @@ def read_character(project: Project, part: Path, name: str) -> dict[str, Any]:
 
         joints = joint_map(read_bvh(part).motion.skeleton)
     else:
-        joints = load_character(part).joints
+        joints = open_character(part).joints
     found = {joint: list(points) for joint, points in joints.names().items()}
     return {"id": project.add_character(part, name, suffix), "name": name, "joints": found}
 

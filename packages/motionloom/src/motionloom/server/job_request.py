@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from motionloom.errors import MotionloomError, listed, meant, quoted
+from motionloom.goals.adapters import Applied, parse_adapter
 from motionloom.goals.fields import Field
 from motionloom.goals.timeline import Timeline, timeline_of
 from motionloom.requests.fields import Spec, specs
@@ -51,6 +52,8 @@ class JobRequest:
     motion: Stored | None = None
     other: Stored | None = None
     """What is switched to."""
+    taught: tuple[Applied, ...] = ()
+    """Adapters of the prior for this job."""
     call: "Callable[[Any, Callable[[int, int], None]], Iterator[Any]] | None" = None
     """Draws instead of the task: (models, progress) -> results to keep."""
 
@@ -100,8 +103,15 @@ def read_request(body: Any, project: Project, limits: Limits) -> JobRequest:
     values = read(
         REQUESTS[task], {"count": min(usual, limits.count)} | given, f"the task {task!r}", most=most(task, limits)
     )
-    found = JobRequest(task, values, values.sampling, _levels(body.get("levels"), limits))
+    taught = tuple(_adapter(word, project) for word in getattr(values, "adapter", ()))
+    found = JobRequest(task, values, values.sampling, _levels(body.get("levels"), limits), taught=taught)
     return _Reader(given, project, limits).request(found)
+
+
+def _adapter(word: str, project: Project) -> Applied:
+    """An adapter of the project's folder for them, and its factor."""
+    path, factor = parse_adapter(word)
+    return Field(str(path), "adapter").file(project.adapters), factor
 
 
 def _levels(value: Any, limits: Limits) -> int:
@@ -119,7 +129,7 @@ class _Reader:
 
     def request(self, found: JobRequest) -> JobRequest:
         """The request with all that it names."""
-        return getattr(self, found.task)(found)
+        return getattr(self, found.task, lambda found: found)(found)
 
     def generate(self, found: JobRequest) -> JobRequest:
         values = found.values

@@ -9,6 +9,9 @@ import json
 from importlib.metadata import version
 from typing import Any
 
+from motionloom.requests.export import Export
+from motionloom.requests.fields import specs
+from motionloom.requests.schema import schema
 from motionloom.server.components import ANYTHING, FILE, ID, TEXT, WHOLE, components, ref
 from motionloom.server.limits import Limits
 
@@ -17,18 +20,18 @@ STYLE = "body{font:16px sans-serif;max-width:50em;margin:2em auto;padding:0 1em}
 BYTES, JSON = "application/octet-stream", "application/json"
 
 
-def _asked(schema: dict[str, Any], kind: str = JSON) -> dict[str, Any]:
-    return {"requestBody": {"required": True, "content": {kind: {"schema": schema}}}}
+def _asked(of: dict[str, Any], kind: str = JSON) -> dict[str, Any]:
+    return {"requestBody": {"required": True, "content": {kind: {"schema": of}}}}
 
 
-def _answered(text: str, schema: dict[str, Any], *, status: int = 200, kind: str = JSON) -> dict[str, Any]:
-    right = {"description": text, "content": {kind: {"schema": schema}}}
+def _answered(text: str, of: dict[str, Any], *, status: int = 200, kind: str = JSON) -> dict[str, Any]:
+    right = {"description": text, "content": {kind: {"schema": of}}}
     wrong = {"description": "one sentence", "content": {JSON: {"schema": ref("Error")}}}
     return {"responses": {str(status): right, "default": wrong}}
 
 
-def _with(name: str, text: str, schema: dict[str, Any] = TEXT, *, place: str = "query") -> dict[str, Any]:
-    return {"name": name, "in": place, "required": place == "path", "description": text, "schema": schema}
+def _with(name: str, text: str, of: dict[str, Any] = TEXT, *, place: str = "query") -> dict[str, Any]:
+    return {"name": name, "in": place, "required": place == "path", "description": text, "schema": of}
 
 
 def _paths() -> dict[str, dict[str, dict[str, Any]]]:
@@ -73,11 +76,11 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
     required = name | {"required": True}
     one, character = _with("id", "of the motion", ID, place="path"), _with("id", "of the character", ID, place="path")
     kind = _with("format", "of the file", ref("MotionFormat"), place="path")
-    options = (
-        _with("skeleton", "smpl22, mixamo, unreal, vrm, rigify or a character's id"),
-        _with("root", "what carries the way on a skeleton with a root bone: motion, hips or in-place"),
-        _with("person", "0, 1, ...", WHOLE),
-    )
+    options = [
+        _with(name, spec.help, ref(name.title()) if spec.words else schema(spec, {}))
+        for name, spec in specs(Export).items()
+        if name not in ("motion", "format", "name")
+    ]
     file, body = _answered("the file; its own media type is in the answer", FILE, kind=BYTES), _asked(FILE, BYTES)
     motion, sent = _answered("the motion", ref("Motion")), _answered("its id", ref("SentMotion"), status=201)
     known = _answered("id, joints; of an .asf without them", ref("SentCharacter"), status=201)

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.errors import MotionloomError
+from motionloom.formats import characters
 from motionloom.io.atomic import atomic_path
 from motionloom.io.text import parse_json
 from motionloom.server.limits import Limits
@@ -42,7 +43,7 @@ except ImportError:  # no such locks on this system
     fcntl = None
 
 ID = re.compile(r"[0-9a-f]{16}")
-CHARACTERS = (".glb", ".gltf", ".vrm", ".bvh", ".asf")
+CHARACTERS = (*characters(alone=True), ".bvh", ".asf")
 CACHED = 24
 """Motions that stay in memory."""
 STALE = 3600.0
@@ -82,11 +83,11 @@ class Project:
     def __init__(self, folder: Path, limits: Limits) -> None:
         self.folder, self.limits = folder.resolve(), limits
         self.motions, self.characters = self.folder / "motions", self.folder / "characters"
-        self.temporary = self.folder / "temporary"
+        self.temporary, self.adapters = self.folder / "temporary", self.folder / "adapters"
         self._lock = threading.RLock()
         self._cache: OrderedDict[str, Stored] = OrderedDict()
         try:
-            for place in (self.motions, self.characters, self.temporary):
+            for place in (self.motions, self.characters, self.temporary, self.adapters):
                 place.mkdir(parents=True, exist_ok=True)
             self._owned = _own(self.folder / "lock")
             for left in self.temporary.iterdir():

@@ -87,6 +87,24 @@ def control(
         MotionloomError: for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
     """
     chosen = Sampling.of(sampling, settings)
+    seeds = chosen.seeds(chosen.number())
+    how = {"adapters": adapters, "fit": fit, "foot_lock": foot_lock, "progress": progress}
+    return control_each(prior, [prompt] * len(seeds), goal, seeds=seeds, sampling=chosen, **how)
+
+
+def control_each(
+    prior: Prior,
+    prompts: Sequence[str],
+    goal: Goal,
+    *,
+    seeds: Sequence[int],
+    sampling: Sampling,
+    adapters: Adapters = "none",
+    fit: bool = True,
+    foot_lock: bool = True,
+    progress: Progress | None = None,
+) -> list[Controlled]:
+    """`control` for motions of one goal, each of its own prompt and seed; arguments and errors as there."""
     longest = round(LONGEST * prior.fps)
     if not 4 <= len(goal) <= longest:
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
@@ -94,11 +112,11 @@ def control(
     nets = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
     made = steered_features(
         prior,
-        [prompt] * chosen.number(),
+        prompts,
         goal.seen_from(place),
-        seeds=chosen.seeds(chosen.number()),
+        seeds=seeds,
         adapters=nets,
-        sampling=chosen,
+        sampling=sampling,
         progress=progress,
     )
     sampled = [moved(to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock), place) for row in made]

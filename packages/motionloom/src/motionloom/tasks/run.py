@@ -16,8 +16,8 @@ from motionloom.goals.hold import FixedJoints
 from motionloom.goals.timeline import Timeline
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
-from motionloom.tasks import control, duet, edit, long, pair, predict, worded
-from motionloom.tasks.adapting import adapt
+from motionloom.tasks import control, duet, edit, long, pair, predict, text, worded
+from motionloom.tasks.adapting import AdaptedPriors, adapt
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenated
 from motionloom.tasks.watching import watching
@@ -44,6 +44,16 @@ class Models:
             return self.weights
         return adapt(Prior.load(self.weights, device=self.device), self.adapters)
 
+    def adapted(self, adapters: tuple[Applied, ...]) -> "Models":
+        """The same with more adapters of the prior; errors as of `adapt`."""
+        if not adapters:
+            return self
+        return Models(self._others.of(adapters), self.pair_weights, self.predictor_weights, self.device)
+
+    @cached_property
+    def _others(self) -> AdaptedPriors:
+        return AdaptedPriors(self.prior)
+
     @cached_property
     def block(self) -> PairBlock:
         """What makes two people of one prior."""
@@ -67,7 +77,7 @@ class Plan:
     sampling: Any
     """The request's `Sampling`, with what its timeline says."""
     seconds: float = 0.0
-    """Length of a duet where no timeline and no motion says it."""
+    """Length where no timeline, goal and motion says it."""
     timeline: Timeline | None = None
     start: Motion | None = None
     """What the timeline goes on from."""
@@ -80,6 +90,10 @@ class Plan:
     target: Motion | None = None
     """What is switched to, on the skeleton and at the rate of the first of them."""
     hold: FixedJoints | None = None
+    taught: tuple[Applied, ...] = ()
+    """Adapters of the prior for these motions, besides those that the models have."""
+    in_pieces: bool = False
+    """Whether the one motion of a timeline is given piece by piece, as it is finished, and not made a loop."""
 
     @property
     def count(self) -> int:
@@ -111,6 +125,7 @@ def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) 
 
     Raises MotionloomError for what cannot be asked, as the functions of the tasks do.
     """
+    models = models.adapted(plan.taught)
     task, size = (_composed, plan.count) if at_once(plan) else _TASKS[plan.task]
     size = 1 if plan.timeline is not None and plan.task == "duet" else size
     own, first = plan.task in ("predict", "switch", "duet"), plan.sampling.first
@@ -121,6 +136,20 @@ def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) 
         for number, result in enumerate(task(group, models, moved), start=first + begin):
             seed = plan.sampling.seed + (0 if own else number)
             yield closed(plan, models, replace(result, number=number, seed=seed))
+
+
+def run_each(
+    plans: Sequence[Plan], models: Models, progress: Progress = lambda done, of: None
+) -> Iterator[tuple[int, Result]]:
+    """The motions of several plans, sampled in the same network calls: (number of the plan, one of its motions).
+
+    They are of `generate`, all with a timeline or all without one, or of `control` with one goal; of the same adapters,
+    and of one sampling but for seeds and counts. A motion depends on its own plan alone, up to the rounding of larger
+    matrix products.
+    """
+    models = models.adapted(plans[0].taught)
+    for index, result in _each(plans, models, progress):
+        yield index, closed(plans[index], models, result)
 
 
 def at_once(plan: Any) -> bool:
@@ -144,7 +173,7 @@ class _Moved:
 def closed(plan: Any, models: Models, result: Result) -> Result:
     """The motion as a loop, where the request says so; an edit makes its own."""
     values = plan.values
-    if plan.task == "edit" or not getattr(values, "loop", False):
+    if plan.task == "edit" or plan.in_pieces or not getattr(values, "loop", False):
         return result
     said = plan.timeline.segments[-1].text if plan.timeline else plan.prompt
     said = "" if plan.task == "duet" else said
@@ -174,7 +203,7 @@ def moves(progress: Progress, steps: int, rows: int) -> Moves:
 def _composed(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     assert plan.timeline is not None
     segments = long.with_loaded(models.prior, plan.timeline.segments)
-    made = long.compose_takes(
+    made = (long.compose if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
         start=plan.start,
@@ -186,30 +215,41 @@ def _composed(plan: Plan, models: Models, progress: Progress) -> Iterator[Result
     return (Result((motion,)) for motion in made)
 
 
-def _worded(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
-    assert plan.timeline is not None
-    asked, lock = [plan.timeline] * plan.count, plan.values.foot_lock
-    for one in worded.draw(models.prior, asked, foot_lock=lock, sampling=plan.sampling, progress=progress):
-        measures = {"amounts": [asdict(amount) for amount in one.amounts]}
-        yield Result((one.motion,), measures=measures, remarks=one.shortfalls, about=one)
+def _one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+    return (result for _, result in _each([plan], models, progress))
 
 
-def _controlled(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
-    goal, _ = plan.goals
-    assert goal is not None
-    made = control.control(
-        models.prior,
-        plan.prompt,
-        goal,
-        adapters=plan.adapters,
-        fit=plan.values.fit,
-        foot_lock=plan.values.foot_lock,
-        sampling=plan.sampling,
-        progress=progress,
-    )
-    for one in made:
-        missed = list(one.missed)
-        yield Result((one.motion,), measures={"missed": missed}, remarks=missed, about=one)
+def _each(plans: Sequence[Plan], models: Models, progress: Progress) -> Iterator[tuple[int, Result]]:
+    first, prior = plans[0], models.prior
+    rows = [(index, number) for index, plan in enumerate(plans) for number in plan.sampling.numbers()]
+    prompts, seeds = [plans[i].prompt for i, _ in rows], [plans[i].sampling.seed + number for i, number in rows]
+    how: dict[str, Any] = {"seeds": seeds, "sampling": first.sampling, "progress": progress}
+    made: Iterable[Result]
+    if first.task == "control":
+        goal, _ = first.goals
+        assert goal is not None
+        own: dict[str, Any] = {"adapters": first.adapters, "fit": first.values.fit}
+        own["foot_lock"] = first.values.foot_lock
+        made = map(_controlled, control.control_each(prior, prompts, goal, **own, **how))
+    elif first.timeline is not None:
+        timelines = [plans[i].timeline or first.timeline for i, _ in rows]
+        made = map(_worded, worded.draw(prior, timelines, foot_lock=first.values.foot_lock, **how))
+    else:
+        frames = [text.frames_in(plans[i].seconds, prior.fps) for i, _ in rows]
+        features = text.sample_features(prior, prompts, frames, padded=True, **how)
+        made = (Result((text.finish(prior, one, foot_lock=first.values.foot_lock),)) for one in features)
+    for (index, number), seed, result in zip(rows, seeds, made, strict=True):
+        yield index, replace(result, number=number, seed=seed)
+
+
+def _worded(made: worded.Worded) -> Result:
+    amounts = [asdict(amount) for amount in made.amounts]
+    return Result((made.motion,), measures={"amounts": amounts}, remarks=made.shortfalls, about=made)
+
+
+def _controlled(made: control.Controlled) -> Result:
+    missed = list(made.missed)
+    return Result((made.motion,), measures={"missed": missed}, remarks=missed, about=made)
 
 
 def _edited(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
@@ -277,8 +317,8 @@ def _duet(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
 _Task = Callable[[Plan, Models, Progress], Iterable[Result]]
 ALL = 10_000
 _TASKS: dict[str, tuple[_Task, int]] = {
-    "generate": (_worded, ALL),
-    "control": (_controlled, BATCH),
+    "generate": (_one, ALL),
+    "control": (_one, BATCH),
     "edit": (_edited, 1),
     "predict": (_predicted, 16),
     "switch": (_switched, 16),

@@ -12,6 +12,7 @@ import numpy as np
 
 from motionloom.diffusion import (
     SOLVERS,
+    Constraint,
     Denoiser,
     Link,
     NoiseSource,
@@ -49,12 +50,15 @@ class Rows:
     seeds: Sequence[int]
     noise: Callable[[Sequence[int]], NoiseSource] = row_noise
     """From seeds to the noise of their rows."""
+    patch: int = 1
+    """Lengths that differ by less share a call: that many frames are a token of the network, so that little is computed
+    for padding. A row's sums are made in the same order whatever is beside it (docs/decisions/0020-bulk.md)."""
 
     def batches(self, size: int) -> list[list[int]]:
-        """Numbers of rows of equal length, at most ``size`` in each."""
+        """Numbers of rows of as many tokens, at most ``size`` in each."""
         by_length: dict[int, list[int]] = {}
         for row, length in enumerate(self.lengths):
-            by_length.setdefault(length, []).append(row)
+            by_length.setdefault(-(-length // self.patch), []).append(row)
         return [rows[i : i + size] for rows in by_length.values() for i in range(0, len(rows), size)]
 
 
@@ -100,6 +104,7 @@ def sample(
     sampling: Sampling,
     *,
     network: Network | None = None,
+    guided: Denoiser | None = None,
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
     halfway: bool = False,
@@ -108,7 +113,8 @@ def sample(
 ) -> Iterator[tuple[int, State]]:
     """Standardised states (tokens, features) with their rows' numbers, each as soon as its batch is finished.
 
-    A row depends on its own prompt, length and seed alone. network: the prior's own unless given. edits: of each
+    A row depends on its own prompt, length and seed alone. network: the prior's own unless given. guided: the guided
+    denoiser of all rows, where it is not that of the network alone. edits: of each
     batch's guided denoiser, after what is observed was put in, the first one first. halfway: stop after half of the
     calls and give the denoised estimates. view: how each network call is seen by who is `watching`; None: nobody can.
     Where the sampling asks for the best of several, each motion's seed is chosen first (`with_best_seeds`).
@@ -126,20 +132,18 @@ def sample(
     if halfway:
         way = way[: len(way) // 2 + 1]
     for numbers in batches:
-        batch = Batch(numbers, prior.condition([rows.prompts[i] for i in numbers]), [rows.seeds[i] for i in numbers])
-        noise, constrain = rows.noise(batch.seeds), None
-        denoise = guide(net, net.bind(batch.cond), net.bind(batch.cond.null()), sampling.guidance)
+        lengths = [rows.lengths[i] for i in numbers]
+        padded = lengths if len(set(lengths)) > 1 else None
+        cond = prior.condition([rows.prompts[i] for i in numbers], padded)
+        batch = Batch(numbers, cond, [rows.seeds[i] for i in numbers])
+        noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
+        denoise, constrain = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.guidance), None
         if observed is None:
-            shape = len(numbers), rows.lengths[numbers[0]], len(prior.mean)
-            state = noise(np.empty(shape, np.float32))
+            state = noise(np.empty((len(numbers), max(lengths), len(prior.mean)), np.float32))
         else:
             here = observed.of(numbers)
             denoise = inpaint(denoise, here.values, here.mask)
-            shown = np.zeros_like if here.noise_free else noise
-            constrain = observe(here.values, here.mask, prior.schedule, shown)
-            whole = here.strength == 1.0
-            state = noise(here.values) if whole else restart(here.values, prior.schedule, way[0], noise)
-            state = constrain(state, way[0])
+            state, constrain = _begun(prior, here, way[0], noise)
         for edit in edits:
             denoise = edit(denoise, batch)
         walk = denoising(
@@ -155,7 +159,15 @@ def sample(
             state, done = snapshot.clean if halfway else snapshot.state, done + 1
             if progress:
                 progress(done, len(batches) * (len(way) - 1))
-        yield from zip(numbers, state, strict=True)
+        yield from ((number, one[:length]) for number, one, length in zip(numbers, state, lengths, strict=True))
+
+
+def _begun(prior: Prior, observed: Observed, level: int, noise: NoiseSource) -> tuple[State, Constraint]:
+    """The state at the first level, and what keeps it to what is observed."""
+    hold = observe(observed.values, observed.mask, prior.schedule, np.zeros_like if observed.noise_free else noise)
+    whole = observed.strength == 1.0
+    state = noise(observed.values) if whole else restart(observed.values, prior.schedule, level, noise)
+    return hold(state, level), hold
 
 
 def with_best_seeds(

@@ -34,6 +34,7 @@ def sample_features(
     frames: Sequence[int],
     *,
     seeds: Sequence[int],
+    padded: bool = False,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -44,29 +45,26 @@ def sample_features(
         prompts: one per row; an empty one is refused.
         frames: length of each row.
         seeds: one per row; a row depends on its own prompt, length and seed alone.
+        padded: rows of nearly one length share network calls.
         sampling: or single settings of it as keywords.
         progress: called after each network call.
 
     Raises:
         MotionloomError: for what cannot be asked.
     """
-    made = dict(_sampled(prior, prompts, frames, seeds, Sampling.of(sampling, settings), progress))
+    rows = Rows(prompts, frames, seeds, patch=prior.net.config.patch if padded else 1)
+    made = dict(_sampled(prior, rows, Sampling.of(sampling, settings), progress))
     return [made[row] for row in range(len(prompts))]
 
 
 def _sampled(
-    prior: Prior,
-    prompts: Sequence[str],
-    frames: Sequence[int],
-    seeds: Sequence[int],
-    sampling: Sampling,
-    progress: Progress | None,
+    prior: Prior, rows: Rows, sampling: Sampling, progress: Progress | None
 ) -> Iterator[tuple[int, np.ndarray]]:
     """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
-    check_prompts(prompts)
-    if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
-        raise MotionloomError(f"seed must be {specs(Sampling)['seed'].range}; got {min(seeds)}")
-    for row, state in sample(prior, Rows(prompts, frames, seeds), sampling, progress=progress, view=alone(prior)):
+    check_prompts(rows.prompts)
+    if not all(0 <= seed < 2 * LARGEST_SEED for seed in rows.seeds):
+        raise MotionloomError(f"seed must be {specs(Sampling)['seed'].range}; got {min(rows.seeds)}")
+    for row, state in sample(prior, rows, sampling, progress=progress, view=alone(prior)):
         yield row, prior.to_features(state)
 
 
@@ -119,32 +117,21 @@ def generate(
 
 def generate_each(
     prior: Prior,
-    prompts: Sequence[str] | str,
+    prompts: Sequence[str],
+    seconds: Sequence[float],
     *,
-    seconds: float | Sequence[float] = 5.0,
+    seeds: Sequence[int],
     foot_lock: bool = True,
-    sampling: Sampling | None = None,
+    sampling: Sampling,
     progress: Progress | None = None,
-    **settings: Unpack[Settings],
 ) -> Iterator[tuple[int, Motion]]:
     """Motions of the words as they are, each with its number as soon as it is finished; else as of `generate`.
 
-    Those of equal length come in order, a batch at a time.
+    Those of equal length come in order, a batch at a time. seconds, seeds: one per prompt.
     """
     check_features(prior)
-    chosen = Sampling.of(sampling, settings)
-    said = [prompts] if isinstance(prompts, str) else list(prompts)
-    lengths = [float(s) for s in np.atleast_1d(np.asarray(seconds, dtype=np.float64))]
-    if np.ndim(seconds) == 0:
-        lengths *= len(said)
-    if len(lengths) != len(said):
-        raise MotionloomError(f"there are {len(lengths)} lengths for {len(said)} prompts; give one, or one per prompt")
-    if not said:
-        raise MotionloomError("nothing to make: no prompt; give at least one")
-    count = chosen.number()
-    said = [prompt for prompt in said for _ in range(count)]
-    frames = [frames_in(length, prior.fps) for length in lengths for _ in range(count)]
-    for row, features in _sampled(prior, said, frames, chosen.seeds(len(said)), chosen, progress):
+    frames = [frames_in(length, prior.fps) for length in seconds]
+    for row, features in _sampled(prior, Rows(prompts, frames, seeds), sampling, progress):
         yield row, finish(prior, features, foot_lock=foot_lock)
 
 

@@ -160,8 +160,8 @@ def generate_worded(
         for text, length in zip(said, lengths, strict=True)
         for _ in range(chosen.number())
     ]
-    settled = replace(chosen, seed=chosen.seeds(1)[0], first=0)
-    made = draw(prior, asked, foot_lock=foot_lock, sampling=settled, progress=progress)
+    seeds = chosen.seeds(len(asked))
+    made = draw(prior, asked, seeds=seeds, foot_lock=foot_lock, sampling=chosen, progress=progress)
     unknown = remarks_on([segment.text for one in asked for segment in one.segments], prior.known, prior.text)
     return [
         replace(one, unknown={part.text: unknown[part.text] for part in one.timeline.segments if part.text in unknown})
@@ -173,17 +173,17 @@ def draw(
     prior: Prior,
     asked: Sequence[Timeline],
     *,
+    seeds: Sequence[int],
     foot_lock: bool = True,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Worded]:
     """The motions of timelines in their order, each from its own seed; those of one free action are drawn together.
 
-    Motion i is sampled from ``sampling.seed + i``. foot_lock, sampling: as of `motionloom.generate`, but that
-    ``sampling.count`` is not looked at. Raises `MotionloomError` for what cannot be asked.
+    seeds: one per timeline. foot_lock, sampling: as of `motionloom.generate`, but that the sampling's ``seed`` and
+    ``count`` are not looked at. Raises `MotionloomError` for what cannot be asked.
     """
     sampling, done = sampling or Sampling(), 0
-    seed = sampling.seeds(1)[0]
     if sampling.solver != SOLVER and any(len(one.segments) > 1 for one in asked):
         raise MotionloomError(
             f"several actions one after the other are drawn with the solver {SOLVER} alone; got {sampling.solver}"
@@ -194,9 +194,10 @@ def draw(
             made = generate_each(
                 prior,
                 [one.segments[0].text for one in several],
-                seconds=[one.segments[0].seconds for one in several],
+                [one.segments[0].seconds for one in several],
+                seeds=seeds[done : done + len(several)],
                 foot_lock=foot_lock,
-                sampling=replace(sampling, seed=seed + done, count=1),
+                sampling=sampling,
                 progress=progress,
             )
             for number, motion in _in_order(made):
@@ -204,7 +205,7 @@ def draw(
             done += len(several)
             continue
         for one in several:
-            yield _tried(prior, one, replace(sampling, count=1), seed + done, foot_lock)
+            yield _tried(prior, one, replace(sampling, count=1), seeds[done], foot_lock)
             done += 1
             if progress:
                 progress(done, len(asked))
@@ -216,7 +217,7 @@ def _tried(prior: Prior, asked: Timeline, sampling: Sampling, seed: int, foot_lo
     for number in range(TRIES):
         own = seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
         now = _shared(asked, shares)
-        motion = _drawn(prior, now, replace(sampling, seed=own), foot_lock)
+        motion = _drawn(prior, now, replace(sampling, seed=own, first=0), foot_lock)
         found = Worded(motion, now, _measured(now, motion))
         counted = [
             one
@@ -261,7 +262,8 @@ def _drawn(prior: Prior, asked: Timeline, sampling: Sampling, foot_lock: bool) -
     if segment.goal is not None:
         (made,) = control(prior, segment.text, segment.goal, foot_lock=foot_lock, sampling=sampling)
         return made.motion
-    ((_, motion),) = generate_each(prior, segment.text, seconds=segment.seconds, foot_lock=foot_lock, sampling=sampling)
+    seeds, texts = sampling.seeds(1), [segment.text]
+    ((_, motion),) = generate_each(prior, texts, [segment.seconds], seeds=seeds, foot_lock=foot_lock, sampling=sampling)
     return motion
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
-from motionloom.goals.hold import HeldPart
+from motionloom.goals.hold import FixedPart
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.skeleton import SMPL22
 from tests.cli.predict.clips import run
@@ -20,7 +20,7 @@ def test_parts_are_held_from_the_line_and_from_a_file(weights, asked):
     assert run(weights, *words, "--hold", "left_arm,lower_body", "--hold", "neck", "--mask", "m.json") == 0
     head, root, line = asked["hold"].parts
     assert [k for k in range(30) if any(a <= (k + 1) / 30 <= b for a, b in head.spans)] == list(range(15))
-    assert (root, line) == (HeldPart(("root",), ((0, 0.5),)), HeldPart(("left_arm", "lower_body", "neck")))
+    assert (root, line) == (FixedPart(("root",), ((0, 0.5),)), FixedPart(("left_arm", "lower_body", "neck")))
     assert (len(asked["hold"].source), asked["hold"].source.skeleton) == (45, asked["past"].skeleton)
     assert run(weights, *words, "--hold", "left_arm", "--from-time", "0.5") == 0
     kick = io.load("kick.bvh")
@@ -49,4 +49,4 @@ def test_the_last_digits_of_a_file_make_no_other_skeleton(weights, asked):
 
 def test_inf_is_the_default_end() -> None:
     """The contract with the tasks: a part named on the line is held for good."""
-    assert HeldPart(("head",)).spans == ((0.0, inf),)
+    assert FixedPart(("head",)).spans == ((0.0, inf),)

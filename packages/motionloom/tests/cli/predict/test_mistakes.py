@@ -1,6 +1,5 @@
 """What predict refuses, and the schema it prints."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -87,10 +86,3 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words,
 def test_a_predictor_is_no_prior(weights, capsys):
     assert main(["generate", "walk", "--weights", weights]) == 2
     assert "is a predictor, not a prior" in capsys.readouterr().err
-
-
-def test_the_schema_is_printed_as_json(capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["predict", "--schema"])
-    assert ended.value.code == 0
-    assert json.loads(capsys.readouterr().out)["title"] == "motionloom mask"

@@ -4,13 +4,18 @@
 """
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
+
+import torch
 
 from motionloom.errors import MotionloomError
+from motionloom.runtime.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
+
+BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -69,3 +74,50 @@ def _quiet(transformers: Any) -> Iterator[None]:
         logging.set_verbosity(level)
         if bar:
             logging.enable_progress_bar()
+
+
+class PretrainedText:
+    """What both towers do with texts: ids, batches, and the rows that were encoded last."""
+
+    def __init__(self, parts: Pretrained, *, length: int, cache: int) -> None:
+        self._model, self._tokenizer, self.length = parts.model, parts.tokenizer, length
+        self._cache = RowCache(cache)
+
+    @property
+    def width(self) -> int:
+        """Numbers of a vector."""
+        return int(self._model.config.hidden_size)
+
+    def to(self, device: torch.device | str) -> Self:
+        """This encoder, moved to another device; its cache is emptied."""
+        self._model.to(device)
+        self._cache = RowCache(self._cache.size)
+        return self
+
+    def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
+        """Tokens (rows, words <= length, width), mask (rows, words), pooled (rows, width); long texts are truncated."""
+        return stack_rows(self._cache.fetch(as_rows(texts), self._encode), self.width)
+
+    def ids(self, text: str) -> list[int]:
+        """Ids of one text with start and end marks, at most `length` (warns where it had to cut)."""
+        tokenizer = self._tokenizer
+        begin, end = tokenizer.bos_token_id, tokenizer.eos_token_id
+        begin, end = (tokenizer.cls_token_id, tokenizer.sep_token_id) if begin is None else (begin, end)
+        room = self.length - 2
+        pieces = cut(text, lambda part: tokenizer(part, add_special_tokens=False, verbose=False).input_ids, room)
+        return [begin, *pieces, end]
+
+    @torch.no_grad()
+    def _encode(self, texts: list[str]) -> list[Row]:
+        rows: list[Row] = []
+        for start in range(0, len(texts), BATCH):
+            ids = [self.ids(text) for text in texts[start : start + BATCH]]
+            longest = max(map(len, ids))
+            padded = torch.tensor([row + [0] * (longest - len(row)) for row in ids])
+            real = torch.tensor([[1] * len(row) + [0] * (longest - len(row)) for row in ids])
+            rows += self._rows(ids, padded.to(self._model.device), real.to(self._model.device))
+        return rows
+
+    def _rows(self, ids: list[list[int]], padded: torch.Tensor, real: torch.Tensor) -> list[Row]:
+        """States and pooled vector of each text; real: which ids are no padding."""
+        raise NotImplementedError

@@ -1,7 +1,7 @@
 """An MMCP request drawn: segments and constraints to motions on the client's skeleton."""
 
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,15 +14,19 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
 from motionloom.goals.goal import FPS, Goal, start_of
 from motionloom.goals.segment import Segment
+from motionloom.goals.timeline import Timeline
 from motionloom.kinematics.feet import planted_feet
 from motionloom.motion import Motion
+from motionloom.requests.compose import Compose
+from motionloom.requests.edit import Edit
+from motionloom.requests.generate import Generate
+from motionloom.requests.sampling import Sampling
 from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
 from motionloom.server.mmcp.rigs import Rig, read_rig
-from motionloom.tasks import long, text
 from motionloom.tasks.control import moved
-from motionloom.tasks.edit import Change, Extend, Loop, Redraw, edit
-from motionloom.tasks.run import Models
+from motionloom.tasks.run import Models, Plan, run, run_each
 from motionloom.tasks.splice import carried_level, concatenated, standing
+from motionloom.tasks.worded import read
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -87,38 +91,58 @@ def _boundaries(request: Any) -> list[int]:
     return [int(end) for end in ends[:-1]]
 
 
+@dataclass(frozen=True)
+class _Sampler:
+    """Draws by the library's own requests, through the one `run`."""
+
+    models: Models
+    sampling: Sampling
+
+    def run(self, task: str, values: Any, seed: int, **named: Any) -> Motion:
+        """The one motion of a request."""
+        plan = Plan(task=task, values=values, sampling=replace(self.sampling, seed=seed), **named)
+        [made] = run(plan, self.models)
+        return made.people[0]
+
+    def compose(self, segments: Sequence[Segment], seed: int, path: Goal | None = None) -> Motion:
+        """Segments, one after the other."""
+        timeline = Timeline(tuple(segments), path=path)
+        return self.run("compose", Compose(timeline=timeline), seed, timeline=timeline)
+
+    def edit(self, motion: Motion, seed: int, **changes: Any) -> Motion:
+        """A motion changed as these fields of `Edit` say, without words."""
+        return self.run("edit", Edit(motion=motion, **changes), seed, people=(motion,))
+
+
 def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, seed: int) -> Motion:
     """One motion of the uniform person at 20 per second."""
     kinds = {segment.type for segment in request.segments}
-    options = _options(request)
+    sampler = _Sampler(models, _sampling(request))
     if kinds == {"pose"}:
-        return _poses(models, request, seed, options)
+        return _poses(sampler, request, seed)
     if "pose" in kinds:
         raise MotionloomError(
             "a pose has one frame and no motion: ask for poses and for motion in requests of their own"
         )
     if "motion_reference" in kinds:
-        motion = _like(models, request, rig, clock, seed, options)
+        motion = _like(sampler, request, rig, clock, seed)
         motion = _bent(motion, asked)
     else:
         segments = _segments(request, clock)
-        motion = _drawn(models, segments, asked, seed, options)
+        motion = _drawn(sampler, segments, asked, seed)
     if request.options and request.options.loop:
-        motion = _looped(models, motion, seed, options)
+        motion = _looped(sampler, motion, seed)
     return motion if asked.ground is None else on_ground(motion, asked.ground)
 
 
-def _options(request: Any) -> dict[str, Any]:
-    """Steps and guidance, where the request says them."""
+def _sampling(request: Any) -> Sampling:
+    """One motion, with the steps and guidance that the request says."""
     found: dict[str, Any] = {}
-    if request.options is None:
-        return found
-    if "diffusion_steps" in request.options.model_fields_set:
+    if request.options is not None and "diffusion_steps" in request.options.model_fields_set:
         found["steps"] = request.options.diffusion_steps
-    guidance = request.options.guidance
-    if guidance is not None:
-        found["guidance"] = guidance.weight[0] if guidance.weight else 1.0
-    return found
+    if request.options is not None and request.options.guidance is not None:
+        found["guidance"] = request.options.guidance.weight[0] if request.options.guidance.weight else 1.0
+    return Sampling(count=1, **found)
 
 
 def _segments(request: Any, clock: Clock) -> list[Segment]:
@@ -143,28 +167,25 @@ def _ends(request: Any, clock: Clock) -> list[int]:
     return [*(clock.frame(int(end)) for end in ends[:-1]), clock.drawn]
 
 
-def _drawn(models: Models, segments: list[Segment], asked: Asked, seed: int, options: dict[str, Any]) -> Motion:
+def _drawn(sampler: _Sampler, segments: list[Segment], asked: Asked, seed: int) -> Motion:
     """The segments, steered to what is asked of them; poses without a place are asked where a first sample is."""
     goal = asked.goal
     if asked.floating:
-        goal = _posed(goal, asked, _steered(models, segments, goal, seed, options))
-    return _steered(models, segments, goal, seed, options)
+        goal = _posed(goal, asked, _steered(sampler, segments, goal, seed))
+    return _steered(sampler, segments, goal, seed)
 
 
-def _steered(models: Models, segments: list[Segment], goal: Goal, seed: int, options: dict[str, Any]) -> Motion:
+def _steered(sampler: _Sampler, segments: list[Segment], goal: Goal, seed: int) -> Motion:
     """One motion of the segments that meets a goal in the world."""
     if goal.empty:
-        return concatenated(*long.compose(models.prior, segments, seed=seed, **options))
+        return sampler.compose(segments, seed)
     if len(segments) == 1:
         place = start_of(goal)
         (only,) = segments
-        wanted = replace(only, goal=goal.seen_from(place))
-        return moved(concatenated(*long.compose(models.prior, [wanted], seed=seed, **options)), place)
-    on_path = goal.asked[:, 0, [0, 2]].all(axis=-1).any()
-    if on_path:
-        path = whole_path(goal)
-        return concatenated(*long.compose(models.prior, segments, seed=seed, path=path, **options))
-    return fit(concatenated(*long.compose(models.prior, segments, seed=seed, **options)), goal)
+        return moved(sampler.compose([replace(only, goal=goal.seen_from(place))], seed), place)
+    if goal.asked[:, 0, [0, 2]].all(axis=-1).any():
+        return sampler.compose(segments, seed, whole_path(goal))
+    return fit(sampler.compose(segments, seed), goal)
 
 
 def _bent(motion: Motion, asked: Asked) -> Motion:
@@ -183,32 +204,39 @@ def _posed(goal: Goal, asked: Asked, motion: Motion) -> Goal:
     return goal
 
 
-def _poses(models: Models, request: Any, seed: int, options: dict[str, Any]) -> Motion:
+def _poses(sampler: _Sampler, request: Any, seed: int) -> Motion:
     """One frame for each prompt: the middle of a short motion, at the origin."""
-    made = text.generate(
-        models.prior, [segment.prompt for segment in request.segments], seconds=POSE_SECONDS, seed=seed, **options
-    )
+    plans = [
+        Plan(
+            task="generate",
+            values=Generate(prompt=segment.prompt),
+            sampling=replace(sampler.sampling, seed=seed + number),
+            timeline=read(sampler.models.prior, segment.prompt, POSE_SECONDS, parted=False),
+        )
+        for number, segment in enumerate(request.segments)
+    ]
+    made = [result.people[0] for _, result in run_each(plans, sampler.models)]
     middle = [motion.frames(len(motion) // 2, len(motion) // 2 + 1) for motion in made]
     return concatenated(*middle, *[middle[-1]] * 4)  # the clock takes as many as it needs
 
 
-def _like(models: Models, request: Any, rig: Rig, clock: Clock, seed: int, options: dict[str, Any]) -> Motion:
+def _like(sampler: _Sampler, request: Any, rig: Rig, clock: Clock, seed: int) -> Motion:
     """Segments of which some are said by a motion: each drawn by itself and put behind the one before."""
     whole: Motion | None = None
     begins = [0, *_ends(request, clock)]
     for number, (segment, begin, end) in enumerate(zip(request.segments, begins, begins[1:], strict=False)):
         frames = end - begin
         if segment.type == "motion_reference":
-            part = _performance(models, segment, rig, frames, seed + number, options)
+            part = _performance(sampler, segment, rig, frames, seed + number)
         else:
             one = Segment(getattr(segment, "prompt", ""), frames / FPS)
-            part = concatenated(*long.compose(models.prior, [one], seed=seed + number, **options))
-        whole = part if whole is None else _joined(models, whole, part, seed + number, options)
+            part = sampler.compose([one], seed + number)
+        whole = part if whole is None else _joined(sampler, whole, part, seed + number)
     assert whole is not None
     return whole
 
 
-def _performance(models: Models, segment: Any, rig: Rig, frames: int, seed: int, options: dict[str, Any]) -> Motion:
+def _performance(sampler: _Sampler, segment: Any, rig: Rig, frames: int, seed: int) -> Motion:
     """A new performance of a clip, of so many frames: its middle varied, its end gone on from where it is short."""
     own = read_rig([joint.model_dump() for joint in segment.skeleton.joints]) if segment.skeleton else rig
     turns = np.array(segment.rotations, dtype=np.float64)
@@ -219,26 +247,25 @@ def _performance(models: Models, segment: Any, rig: Rig, frames: int, seed: int,
     if len(clip) < 8:
         raise MotionloomError(f"a motion to be like is {len(clip) / FPS:.2f} s long; at least 0.4 s are needed")
     missing = frames - len(clip)
-    changes: list[Change] = [Redraw([(0.0, clip.seconds)], strength=VARIED)]
-    if missing > 0:
-        changes.append(Extend(max(missing, 2) / FPS))
-    return edit(models.prior, clip, "", changes, seed=seed, **options)[0].frames(0, frames)
+    longer = max(missing, 2) / FPS if missing > 0 else 0.0
+    changed = sampler.edit(clip, seed, between=((0.0, clip.seconds),), strength=VARIED, extend=longer)
+    return changed.frames(0, frames)
 
 
-def _joined(models: Models, before: Motion, behind: Motion, seed: int, options: dict[str, Any]) -> Motion:
+def _joined(sampler: _Sampler, before: Motion, behind: Motion, seed: int) -> Motion:
     (end, facing), (begin, faced) = standing(before, len(before) - 1), standing(behind, 0)
     behind = carried_level(behind, rot.multiply(facing, rot.inverse(faced)), begin, end)
     seam = before.seconds
     whole = concatenated(before, behind)
     around = min(SEAM, before.seconds / 2, behind.seconds / 2)
     span = (seam - around, min(seam + around, whole.seconds))
-    return edit(models.prior, whole, "", Redraw([span]), seed=seed, **options)[0]
+    return sampler.edit(whole, seed, between=(span,))
 
 
-def _looped(models: Models, motion: Motion, seed: int, options: dict[str, Any]) -> Motion:
+def _looped(sampler: _Sampler, motion: Motion, seed: int) -> Motion:
     """A cycle: its last frame is its first one again, moved on by the way of one cycle."""
     blend = min(1.0, max(motion.seconds / 3, 0.1))
-    cycle = edit(models.prior, motion.frames(0, len(motion) - 1), "", Loop(blend), seed=seed, **options)[0]
+    cycle = sampler.edit(motion.frames(0, len(motion) - 1), seed, loop=True, blend=blend)
     last = cycle.frames(0, 1)
     step = (cycle.root[1] - cycle.root[0]) * np.array([1.0, 0.0, 1.0])
     place = cycle.root[-1:] + step

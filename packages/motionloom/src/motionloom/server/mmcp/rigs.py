@@ -56,8 +56,7 @@ class Rig:
         local = np.tile(self._local_rest(), (len(turns), 1, 1))
         for number, name in enumerate(names):
             local[:, self.skeleton.index(name)] = rot.normalize(np.roll(turns[:, number], 1, axis=-1))
-        parents = [self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents]
-        own = rot.multiply(rot.multiply(np.array(parents)[None], local), rot.inverse(self.rest)[None])
+        own = rot.multiply(rot.multiply(self._parents[None], local), rot.inverse(self.rest)[None])
         return Motion(self.skeleton, fps, root, rot.normalize(own))
 
     def person(self, motion: Motion) -> Motion:
@@ -70,24 +69,26 @@ class Rig:
 
     def rotations_of(self, motion: Motion) -> Array:
         """(frames, joints, 4) rotations of a motion on this skeleton as MMCP has them."""
-        parents = [self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents]
-        turned = rot.multiply(rot.inverse(np.array(parents))[None], rot.multiply(motion.rotations, self.rest[None]))
+        turned = rot.multiply(rot.inverse(self._parents)[None], rot.multiply(motion.rotations, self.rest[None]))
         return np.roll(rot.normalize(turned), -1, axis=-1)
 
     def places_of(self, motion: Motion) -> Array | None:
         """(frames, joints, 3) places of joints in their parents' frames, the root's in the world; None: at rest."""
         if motion.translations is None:
             return None
-        parents = np.array([self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents])
         places = rot.rotate(
-            np.broadcast_to(rot.inverse(parents), (*motion.translations.shape[:2], 4)), motion.translations
+            np.broadcast_to(rot.inverse(self._parents), (*motion.translations.shape[:2], 4)), motion.translations
         )
         places[:, 0] = motion.root
         return places
 
+    @property
+    def _parents(self) -> Array:
+        """(joints, 4) rest rotations of the joints' parents."""
+        return np.array([self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents])
+
     def _local_rest(self) -> Array:
-        parents = [self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents]
-        return rot.multiply(rot.inverse(np.array(parents)), self.rest)
+        return rot.multiply(rot.inverse(self._parents), self.rest)
 
 
 def read_rig(joints: Sequence[Mapping[str, Any]]) -> Rig:
