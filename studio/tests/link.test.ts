@@ -6,6 +6,7 @@ const PROJECT: Project = {
     { text: "walks & turns #1, 100 % = ü", seconds: 2.5 },
     { text: "jumps", seconds: 10 },
   ],
+  literal: false,
   seed: 2 ** 40,
   takes: 4,
   path: [
@@ -17,6 +18,8 @@ const PROJECT: Project = {
 
 test("a project comes back from its address", () => {
   expect(ofAddress(`#${toAddress(PROJECT)}`)).toEqual(PROJECT);
+  const literal = { ...PROJECT, literal: true };
+  expect(ofAddress(`#${toAddress(literal)}`)).toEqual(literal);
   expect(ofAddress("")).toBeNull();
   expect(ofAddress("#")).toBeNull();
 });
@@ -25,6 +28,7 @@ test("what is no project is refused", () => {
   const bad: [string, string, string][] = [
     ["seed=1099511627776", "seed=1.5", "seed is"],
     ["seed=1099511627776", "seed=1099511627777", "seed is"],
+    ["n=1", "n=2", "n is"],
     ["takes=4", "takes=0", "takes is"],
     ["s=10+jumps", "s=10+", "0 letters"],
     ["s=10+jumps", `s=10+${"a".repeat(401)}`, "401 letters"],

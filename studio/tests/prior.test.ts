@@ -5,10 +5,12 @@ import { join } from "node:path";
 import * as ort from "onnxruntime-web/wasm";
 import { beforeAll, describe, expect, test } from "vitest";
 import { Network, type Runtime } from "../src/prior/network";
-import { Noise } from "../src/prior/noise";
+import { Noise, rowSeed } from "../src/prior/noise";
 import { type Body, placesOf } from "../src/prior/person";
 import { startOf } from "../src/prior/path";
-import { Prior, type Segment, finished, flat, sketched } from "../src/prior/prior";
+import { Prior, finished, flat, literal, sketched } from "../src/prior/prior";
+import { supported } from "../src/prior/stairs";
+import { type Part, measured, partsOf, reading } from "../src/prior/wanted";
 import { type Manifest, Packed } from "../src/prior/weights";
 
 const FOLDER = process.env.MOTIONLOOM_TAB ?? "";
@@ -18,6 +20,9 @@ interface Expected {
   sentences: string[];
   chains: [string, number][][];
   path: [number, number][];
+  worded: [string, number][];
+  borne: string[];
+  seeds: [number, number, string][];
   tokens: [string, number[]][];
 }
 
@@ -76,8 +81,12 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
   test("the noise of a seed is the same", () => {
     const names = Object.keys(said.index).filter((name) => name.startsWith("noise "));
     for (const name of names)
-      expect(off(new Noise(Number(name.slice(6))).normals(200_000), wanted(name)), name).toBeLessThan(1e-6);
+      expect(off(new Noise(BigInt(name.slice(6))).normals(200_000), wanted(name)), name).toBeLessThan(1e-6);
   }, 600_000);
+
+  test("seeds of further tries are the same", () => {
+    for (const [seed, number, wanted] of said.seeds) expect(String(rowSeed(seed, number))).toBe(wanted);
+  });
 
   test("denoised states are the same", async () => {
     const asked = await prior.network.ask(said.sentences[0]!);
@@ -91,7 +100,7 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
    * The walk adds up the last bits of 24 calls; so that no foot counts as planted here and not there, bodies are made of
    * Python's features.
    */
-  const drawn = async (name: string, segments: Segment[], seed: number, path?: [number, number][]): Promise<void> => {
+  const drawn = async (name: string, segments: Part[], seed: number, path?: [number, number][]): Promise<void> => {
     const std = prior.network.packed.tensor("std");
     const theirs = wanted(`${name}.features`);
     const way = path && prior.way(segments, path);
@@ -110,12 +119,23 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
 
   test("sentences are the same motions", async () => {
     for (const [seed, text] of said.sentences.entries())
-      await drawn(`sentence ${seed}`, [{ text, seconds: 2 + 0.35 * seed }], seed);
+      await drawn(`sentence ${seed}`, literal([{ text, seconds: 2 + 0.35 * seed }]), seed);
+  }, 600_000);
+
+  test("steps, the floor and hands are as there", () => {
+    for (const text of said.borne) {
+      const plain = finished(wanted(`${text}.features`), prior.fps);
+      const body = supported(plain);
+      const theirs = wanted(`${text}.places`);
+      expect(off(flat(placesOf(plain)), theirs), `${text}: metres, that something is done`).toBeGreaterThan(0.01);
+      expect(off(flat(placesOf(body)), theirs), `${text}: metres`).toBeLessThan(1e-3);
+      expect(apart(body, wanted(`${text}.turns`)), `${text}: degrees`).toBeLessThan(0.1);
+    }
   }, 600_000);
 
   test("a path is followed as there, and kept to", async () => {
     if (!("path.features" in said.index)) return;
-    const segments = [{ text: "a person walks", seconds: 5 }];
+    const segments = literal([{ text: "a person walks", seconds: 5 }]);
     await drawn("path", segments, 4, said.path);
     const places = wanted("path.places");
     const { places: way } = prior.way(segments, said.path);
@@ -127,17 +147,22 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
     if (!("path of a chain.seen" in said.index)) return;
     const segments = said.chains[0]!.map(([text, seconds]) => ({ text, seconds }));
     const way = prior.way(segments, said.path);
-    const [features] = await prior.features(segments, 4, 1, undefined, way);
+    const [features] = await prior.features(literal(segments), 4, 1, undefined, way);
     expect(off(sketched(features!, startOf(way)), wanted("path of a chain.seen")), "metres").toBeLessThan(1e-3);
   }, 600_000);
 
   test("a chain is the same motion", async () => {
     const chains = said.chains.filter((_, n) => `chain ${n}.features` in said.index);
     for (const [n, chain] of chains.entries())
-      await drawn(
-        `chain ${n}`,
-        chain.map(([text, seconds]) => ({ text, seconds })),
-        4,
-      );
+      await drawn(`chain ${n}`, literal(chain.map(([text, seconds]) => ({ text, seconds }))), 4);
+  }, 600_000);
+
+  test("numbers in words are kept to as there", async () => {
+    for (const [text, size] of said.worded) {
+      const { amount, seconds } = reading(text, prior.fps, 60);
+      await drawn(text, partsOf(text, seconds!, amount, prior.fps), 6);
+      const body = finished(wanted(`${text}.features`), prior.fps);
+      if (amount!.kind !== "count") expect(measured(amount!, placesOf(body), prior.fps), text).toBeCloseTo(size, 1);
+    }
   }, 600_000);
 });

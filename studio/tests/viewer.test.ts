@@ -3,6 +3,7 @@ import { deflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
 import { whole } from "../single";
 import { motionClip } from "../src/body/clip";
+import { packed as packedByTab } from "../src/tab/share";
 import { curve } from "../src/viewer/curves";
 import { placesOf } from "../src/viewer/data";
 
@@ -27,6 +28,12 @@ describe("places in a page", () => {
     expect(places[64]).toBe(0);
     expect(places[66 + 64]).toBeCloseTo(0.25025, 5);
     expect(places[66 + 65]).toBe(0);
+  });
+
+  test("come back from what the page without a server packs", async () => {
+    const places = Float32Array.from({ length: 5 * 66 }, (_, n) => Math.sin(n) * 3 + (n % 66 < 3 ? n / 10 : 0));
+    const found = await placesOf({ frames: 5, data: await packedByTab(places) }, 0.00025);
+    expect(Math.max(...found.map((place, n) => Math.abs(place - places[n]!)))).toBeLessThan(0.0003);
   });
 
   test("that are not whole are refused", async () => {

@@ -25,17 +25,19 @@ import {
 const EASE = 0.25;
 const TURN_EASE = 0.1;
 const LOW = [0.11, 0.05, 0.11, 0.05] as const;
-const [SLOW, TOLD_SLOW] = [0.35, 0.6] as const;
+/** Metres per second: what starts a contact, what keeps it, and what a foot said to be planted may have. */
+const [SLOW, STILL_SLOW, TOLD_SLOW] = [0.35, 0.5, 0.6] as const;
 const DRIFT = 0.12;
 const SUNK = 0.002;
 /** Left ankle, left foot, right ankle, right foot: the order of the flags. */
-const FEET = [LEFT.ankle, LEFT.foot, RIGHT.ankle, RIGHT.foot] as const;
+export const FEET = [LEFT.ankle, LEFT.foot, RIGHT.ankle, RIGHT.foot] as const;
 const NONE: Vec = [0, 0, 0];
 
-type Span = readonly [number, number];
+export type Span = readonly [number, number];
+type Contacts = readonly (readonly number[])[] | null;
 
-/** The body with planted feet locked; `contacts` are four numbers a frame as the features have them. */
-export function cleanFeet(body: Body, contacts: readonly (readonly number[])[]): Body {
+/** The body with planted feet locked; `contacts`: four numbers a frame as the features have them; null: as it looks. */
+export function cleanFeet(body: Body, contacts: Contacts): Body {
   const { fps } = body;
   if (body.root.length < 4) return body;
   const places = placesOf(body);
@@ -71,7 +73,7 @@ export function cleanFeet(body: Body, contacts: readonly (readonly number[])[]):
 }
 
 /** Four flags a frame: low, slow, said to be planted, and long enough to be a step. */
-function plantedFeet(places: readonly Vec[][], fps: number, contacts: readonly (readonly number[])[]): boolean[][] {
+export function plantedFeet(places: readonly Vec[][], fps: number, contacts: Contacts): boolean[][] {
   const last = places.length - 1;
   const speed = places.map((_, f) =>
     FEET.map((joint) => {
@@ -83,19 +85,23 @@ function plantedFeet(places: readonly Vec[][], fps: number, contacts: readonly (
   const resting = height.flatMap((row, f) => [1, 3].filter((k) => speed[f]![k]! < SLOW).map((k) => row[k]!));
   const level = resting.length ? percentile(resting, 30) : Math.min(...height.flat());
   const may = places.map((_, f) =>
-    FEET.map((__, k) => height[f]![k]! < level + LOW[k]! && speed[f]![k]! < TOLD_SLOW && contacts[f]![k]! > 0.5),
+    FEET.map((__, k) => {
+      if (height[f]![k]! >= level + LOW[k]!) return false;
+      return contacts ? speed[f]![k]! < TOLD_SLOW && contacts[f]![k]! > 0.5 : speed[f]![k]! < STILL_SLOW;
+    }),
   );
   const [least, gap] = [Math.max(2, rounded(0.12 * fps)), Math.max(1, rounded(0.1 * fps))];
   const result = may.map(() => [false, false, false, false]);
   for (const k of FEET.keys()) {
-    for (const [start, stop] of joined(spans(may.map((row) => row[k]!)), gap))
+    const sure = ([start, stop]: Span): boolean => !!contacts || speed.slice(start, stop).some((row) => row[k]! < SLOW);
+    for (const [start, stop] of joined(spans(may.map((row) => row[k]!)).filter(sure), gap))
       for (let f = start; f < stop; f += 1) result[f]![k] = stop - start >= least;
   }
   return result;
 }
 
 /** Half-open ranges of consecutive true flags. */
-function spans(flags: readonly boolean[]): Span[] {
+export function spans(flags: readonly boolean[]): Span[] {
   const found: [number, number][] = [];
   flags.forEach((flag, f) => {
     if (flag && !flags[f - 1]) found.push([f, f]);

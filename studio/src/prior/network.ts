@@ -32,6 +32,9 @@ export interface Row {
 type Numbers = TypedTensor<"float32">;
 type Graph = "text" | "bind" | "prior";
 
+/** What computes has failed, whatever it was given. */
+export class Failed extends Error {}
+
 export class Network {
   private readonly pieces: WordPiece;
   private readonly nothing: Promise<Asked>;
@@ -42,19 +45,23 @@ export class Network {
     private readonly ort: Runtime,
     readonly packed: Packed,
     private readonly sessions: Record<Graph, InferenceSession>,
+    readonly graphics: boolean,
   ) {
     this.pieces = new WordPiece(new TextDecoder().decode(packed.bytes(packed.about.vocabulary)));
     const width = packed.about.tensors["text.places.weight"]!.shape[1]!;
     this.nothing = this.bound(new Float32Array(width), new Float32Array(width), 1);
   }
 
-  static async open(ort: Runtime, packed: Packed, options: InferenceSession.SessionOptions = {}): Promise<Network> {
+  /** `graphics`: the large graph runs on WebGPU, which the runtime must know; the small ones never do. */
+  static async open(ort: Runtime, packed: Packed, graphics = false): Promise<Network> {
     const open = (name: Graph): Promise<InferenceSession> =>
       ort.InferenceSession.create(packed.bytes(packed.about.graphs[name]!), {
-        ...options,
+        logSeverityLevel: 3,
+        ...(graphics && { executionProviders: [name === "prior" ? "webgpu" : "wasm"] }),
         externalData: [{ path: "weights", data: packed.weightsOf(name) }],
       });
-    return new Network(ort, packed, { text: await open("text"), bind: await open("bind"), prior: await open("prior") });
+    const sessions = { text: await open("text"), bind: await open("bind"), prior: await open("prior") };
+    return new Network(ort, packed, sessions, graphics);
   }
 
   tokens(text: string): number[] {
@@ -156,7 +163,9 @@ export class Network {
 
   /** One call after the other: ONNX Runtime Web mixes up the memory of calls that overlap, of whichever graph. */
   private run(graph: Graph, given: InferenceSession.FeedsType): Promise<InferenceSession.ReturnType> {
-    const made = this.last.then(() => this.sessions[graph].run(given));
+    const made = this.last
+      .then(() => this.sessions[graph].run(given))
+      .catch((error: Error) => Promise.reject(new Failed(error.message)));
     this.last = made.catch(() => undefined);
     return made;
   }

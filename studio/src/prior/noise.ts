@@ -9,8 +9,18 @@ const M64 = 0xffffffffffffffffn;
 const M128 = (1n << 128n) - 1n;
 const MULTIPLIER = 0x2360ed051fc65da44385df649fccf645n;
 
-/** Eight words of 32 bits out of a seed below 2^64. */
-function seeded(seed: bigint): number[] {
+/** The words of 32 bits of a whole number below 2^64, as few as it has. */
+const wordsOf = (number: bigint): number[] =>
+  [number, number >> 32n].slice(0, number > M32 ? 2 : 1).map((x) => Number(x & M32));
+
+/** A seed for one more try of what has a seed (`motionloom.diffusion.sampling.row_seed`). */
+export function rowSeed(seed: number, number: number): bigint {
+  const [low, high] = seeded([...wordsOf(BigInt(seed)), number, 0]).map(BigInt) as [bigint, bigint];
+  return (((high << 32n) | low) >> 1n) & ((1n << 62n) - 1n);
+}
+
+/** Eight words of 32 bits out of at most four. */
+function seeded(words: readonly number[]): number[] {
   let hash = 0x43b0d7e5;
   const hashed = (value: number): number => {
     let x = (value ^ hash) >>> 0;
@@ -22,7 +32,7 @@ function seeded(seed: bigint): number[] {
     const x = (Math.imul(a, 0xca01f9dd) - Math.imul(b, 0x4973f715)) >>> 0;
     return (x ^ (x >>> 16)) >>> 0;
   };
-  const pool = [Number(seed & M32), Number(seed >> 32n), 0, 0].map(hashed);
+  const pool = [0, 1, 2, 3].map((n) => hashed(words[n] ?? 0));
   for (let from = 0; from < 4; from += 1)
     for (let to = 0; to < 4; to += 1) if (from !== to) pool[to] = mixed(pool[to]!, hashed(pool[from]!));
   let state = 0x8b51f9dd;
@@ -60,9 +70,9 @@ export class Noise {
   private readonly step: bigint;
   private spare: number | null = null;
 
-  /** A whole seed from 0 to 2^53. */
-  constructor(seed: number) {
-    const words = seeded(BigInt(seed)).map(BigInt);
+  /** A whole seed from 0 to 2^64. */
+  constructor(seed: bigint) {
+    const words = seeded(wordsOf(seed)).map(BigInt);
     const [a, b, c, d] = [0, 2, 4, 6].map((n) => words[n]! | (words[n + 1]! << 32n)) as [
       bigint,
       bigint,

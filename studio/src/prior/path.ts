@@ -11,6 +11,8 @@ export type Place = readonly [number, number];
 export interface Way {
   readonly places: readonly Place[];
   readonly facing: readonly number[] | null;
+  /** Whether the places are nobody's concern, and only the facing is. */
+  readonly free?: boolean;
 }
 
 /** Metres per second: nobody runs faster. */
@@ -47,6 +49,7 @@ export function startOf({ places, facing }: Way): GroundPose {
 export function seenFrom(way: Way, pose: GroundPose, first = 0, last = way.places.length): Way {
   const [c, s] = [Math.cos(pose.facing), Math.sin(pose.facing)];
   return {
+    ...way,
     places: way.places.slice(first, last).map(([px, pz]) => {
       const [x, z] = [px - pose.x, pz - pose.z];
       return [c * x - s * z, c * z + s * x];
@@ -138,7 +141,7 @@ export function along(places: readonly Place[], fps: number): number[] {
 }
 
 /** Linear between values at rising places, constant beyond them. */
-function between(x: number, at: readonly number[], values: readonly number[]): number {
+export function between(x: number, at: readonly number[], values: readonly number[]): number {
   const n = at.findIndex((one) => one > x);
   if (n <= 0) return n ? values.at(-1)! : values[0]!;
   return values[n - 1]! + ((x - at[n - 1]!) / (at[n]! - at[n - 1]!)) * (values[n]! - values[n - 1]!);

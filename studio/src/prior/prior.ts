@@ -11,19 +11,22 @@ import type { Asked, Network } from "./network";
 import type { Body } from "./person";
 import { type Place, type Way, seenFrom, startOf, wayThrough } from "./path";
 import { cosine, levels, move } from "./schedule";
+import { supported } from "./stairs";
 import { Steering } from "./steering";
 import { type Vec, rounded } from "./turns";
+import { type Part, TRANSITION } from "./wanted";
 
 export interface Segment {
   readonly text: string;
   readonly seconds: number;
 }
 
+/** Sentences as parts without numbers: they share a second where they meet. */
+export const literal = (segments: readonly Segment[]): Part[] =>
+  segments.map(({ text, seconds }) => ({ text, seconds, transition: TRANSITION, way: null }));
+
 /** Called behind each network call with the denoised features of each take; a rejection ends the drawing. */
 export type Watcher = (done: number, of: number, takes: () => Float32Array[]) => Promise<void>;
-
-/** Seconds over which one segment becomes the next. */
-export const TRANSITION = 1;
 
 export class Prior {
   private readonly mean: Float32Array;
@@ -43,8 +46,8 @@ export class Prior {
    * features begin at `startOf` it.
    */
   async features(
-    segments: readonly Segment[],
-    seed: number,
+    segments: readonly Part[],
+    seed: number | bigint,
     takes: number,
     watch?: Watcher,
     way?: Way | null,
@@ -66,45 +69,60 @@ export class Prior {
     );
   }
 
+  /**
+   * The person that features of parts are: with constant bones and still feet, on `way` if there is one. Where nobody says
+   * where to go, steps are under who climbs, and the floor under who hovers.
+   */
+  person(features: ArrayLike<number>, parts: readonly Part[], way: Way | null): Body {
+    const body = finished(features, this.fps, way ? startOf(way) : ORIGIN);
+    return way || (parts.length === 1 && parts[0]!.way) ? body : supported(body);
+  }
+
   /** Frames of a motion of so many seconds. */
   frames(seconds: number): number {
     return Math.max(rounded(seconds * this.fps), 4);
   }
 
   private async single(
-    { text, seconds }: Segment,
-    seed: number,
+    { text, seconds, way: own }: Part,
+    seed: number | bigint,
     takes: number,
     watch: Watcher | undefined,
     way: Way | null,
   ): Promise<Float32Array[]> {
     const [asked, frames] = [await this.network.ask(text), this.frames(seconds)];
-    const steering = way && this.steering(seenFrom(way, startOf(way)), frames, 0);
-    const rows = Array.from({ length: takes }, (_, n) => new Link(frames, 0, 0, asked, seed + n, steering));
+    const steering = way ? this.steering(seenFrom(way, startOf(way)), frames, 0) : own && this.steering(own, frames, 0);
+    const rows = Array.from(
+      { length: takes },
+      (_, n) => new Link(frames, 0, 0, asked, BigInt(seed) + BigInt(n), steering),
+    );
     return await this.walk(rows, false, watch, (states) => states.map((state) => smooth(this.plain(state))));
   }
 
   private async chain(
-    segments: readonly Segment[],
-    seed: number,
+    segments: readonly Part[],
+    seed: number | bigint,
     takes: number,
     watch: Watcher | undefined,
     way: Way | null,
   ): Promise<Float32Array[]> {
-    const half = Math.max(1, rounded((TRANSITION * this.fps) / 2));
+    const seams = segments.map(({ transition }, n) =>
+      n < segments.length - 1 ? Math.max(1, rounded((transition * this.fps) / 2)) : 0,
+    );
     const asked = await Promise.all(segments.map(({ text }) => this.network.ask(text)));
     const rows: Link[] = [];
     for (let take = 0; take < takes; take += 1) {
       let first = 0;
-      segments.forEach(({ text, seconds }, n) => {
-        const [before, after, frames] = [n ? half : 0, n < segments.length - 1 ? half : 0, rounded(seconds * this.fps)];
+      segments.forEach(({ text, seconds, way: wanted }, n) => {
+        const [before, after, frames] = [seams[n - 1] ?? 0, seams[n]!, rounded(seconds * this.fps)];
         if (frames < before + after || frames < 2)
           throw new Error(
             `"${text.slice(0, 40)}" of ${seconds} s is shorter than half its transitions; make it longer`,
           );
         const length = before + frames + after;
-        const own = way && this.steering(seenFrom(way, poseOn(way, first), first, first + frames), length, before);
-        rows.push(new Link(length, before, after, asked[n]!, seed + take + n, own));
+        const part = way ? seenFrom(way, poseOn(way, first), first, first + frames) : wanted;
+        const own = part && this.steering(part, length, before);
+        rows.push(new Link(length, before, after, asked[n]!, BigInt(seed) + BigInt(take + n), own));
         first += frames;
       });
     }
@@ -199,7 +217,7 @@ class Link {
     readonly before: number,
     readonly after: number,
     readonly asked: Asked,
-    seed: number,
+    seed: bigint,
     readonly steering: Steering | null,
   ) {
     this.noise = new Noise(seed);

@@ -70,10 +70,11 @@ export class Steering {
   private plan(width: number): Plan {
     const pace = summed(bell(this.frames, width), this.frames, this.first);
     const gain = (size: number, noise: number): Float64Array => this.gain(pace, size * size, noise * noise);
+    const none = new Float64Array();
     return {
-      move: gain(PACE, EXACT),
-      turn: this.way.facing ? gain(YAW, SQUARE) : new Float64Array(),
-      rest: gain(STILL, EXACT),
+      move: this.way.free ? none : gain(PACE, EXACT),
+      turn: this.way.facing ? gain(YAW, SQUARE) : none,
+      rest: this.way.free ? none : gain(STILL, EXACT),
     };
   }
 
@@ -108,6 +109,7 @@ export class Steering {
 
   /** The estimate with its root nearer to the way. */
   private toPath(now: Estimate, gain: Float64Array): Estimate {
+    if (this.way.free) return now;
     const places = this.way.places.slice(0, this.asked);
     const dx = product(
       gain,

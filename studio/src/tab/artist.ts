@@ -10,12 +10,17 @@ export interface Drawn {
   readonly project: Project;
   readonly bodies: readonly Body[];
   readonly clips: readonly MotionClip[];
+  /** For each take what it misses of the numbers in the words. */
+  readonly misses: readonly (readonly string[])[];
 }
 
 export interface State {
   /** Null until the weights are there. */
   readonly about: About | null;
   readonly threads: number;
+  /** Whether the graphics processor draws; why it does not though there is one. */
+  readonly graphics: boolean;
+  readonly remark: string;
   /** From 0 to 1; null: nothing is under way. */
   readonly progress: number | null;
   readonly says: string;
@@ -31,6 +36,8 @@ export class Artist {
   readonly state = new Signal<State>({
     about: null,
     threads: 0,
+    graphics: false,
+    remark: "",
     progress: 0,
     says: "loading the weights",
     error: "",
@@ -53,8 +60,8 @@ export class Artist {
     this.id += 1;
     performance.mark("asked");
     if (this.state.value.about) this.state.update({ progress: 0, says: "drawing", error: "", sketch: [] });
-    const { segments, seed, takes, path } = project;
-    this.worker.postMessage({ id: this.id, segments, seed, takes, path } satisfies Draw);
+    const { segments, literal, seed, takes, path } = project;
+    this.worker.postMessage({ id: this.id, segments, literal, seed, takes, path } satisfies Draw);
   }
 
   /** Give up what is being drawn; what was drawn before is there again. */
@@ -73,10 +80,12 @@ export class Artist {
         says: `loading the weights: ${done.toFixed(0)} of ${of.toFixed(0)} MB`,
       });
     } else if (said.kind === "ready") {
-      const { about, threads } = said;
+      const { about, threads, graphics, remark } = said;
       this.state.update({
         about,
         threads,
+        graphics,
+        remark,
         ...(this.asked ? { progress: 0, says: "drawing" } : { progress: null, says: "" }),
       });
     } else if (said.id !== null && said.id !== this.id) return;
@@ -89,7 +98,12 @@ export class Artist {
       const clips = said.takes.map((places) => motionClip(FPS, [places]));
       performance.mark("drawn");
       const project = { ...this.asked!, weights: this.state.value.about!.weights };
-      this.state.update({ progress: null, says: "", sketch: [], drawn: { project, bodies: said.bodies, clips } });
+      this.state.update({
+        progress: null,
+        says: "",
+        sketch: [],
+        drawn: { project, bodies: said.bodies, clips, misses: said.misses },
+      });
     }
   }
 

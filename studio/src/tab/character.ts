@@ -5,12 +5,14 @@ import { type GLTF, GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/addons/libs/meshopt_decoder.module.js";
 import type { Body } from "../prior/person";
 import { type Actor, actorOf, inside } from "../stage/actor";
-import { type Content, type Moves, Packing, unpacked } from "./glbFile";
+import { type Content, type Moves, Packing, unpacked, withoutAnimations } from "./glbFile";
 import { type Fit, fitOf, retargeted } from "./retarget";
 import { type Pose, hung, poseOf, rigOf, unhung, WORLD } from "./rig";
 
 /** Bytes of the largest file that is opened. */
 const MOST = 150e6;
+/** Quaternions and metres of a motion in a page are multiples of it: 0.01 degrees, 0.1 millimetres. */
+const GRAIN = 2 ** -13;
 const LOCKED = ["KHR_draco_mesh_compression", "KHR_texture_basisu"];
 
 export class Character {
@@ -52,10 +54,20 @@ export class Character {
     return actorOf(root, [clipOf(this.gltf, moves)]);
   }
 
-  /** The file with the motion as its only animation. */
-  glb(body: Body, name: string): ArrayBuffer {
-    const packing = new Packing(this.content, this.binary);
-    packing.animate(name, retargeted(body, this.fit));
+  /** Its way in metres of its file, for a metre of the plain figure's. */
+  get scale(): number {
+    return this.fit.ratio / this.fit.size;
+  }
+
+  /**
+   * The file with the motion as its only animation. `open`: for a page, small when deflated, without the numbers of its own
+   * animations; an Error where its meshes are packed.
+   */
+  glb(body: Body, name: string, open = false): ArrayBuffer {
+    if (open && this.content.extensionsRequired?.includes("EXT_meshopt_compression"))
+      throw new Error(`${this.name} is packed with EXT_meshopt_compression, which a shared page cannot unpack`);
+    const packing = new Packing(this.content, open ? withoutAnimations(this.content, this.binary) : this.binary);
+    packing.animate(name, retargeted(body, this.fit), open ? GRAIN : 0);
     return packing.bytes();
   }
 }

@@ -23,7 +23,8 @@ export class FloorPath {
   private drawn: { x: number; z: number }[] | null = null;
   private typed: Place[] = [];
   private cursor: Place = [0, 0];
-  private camera: THREE.Vector3 | null = null;
+  /** Where the camera was, and looked at, before a path is drawn. */
+  private view: readonly [THREE.Vector3, THREE.Vector3] | null = null;
 
   /** `done`: a path is finished, or null, given up. */
   constructor(
@@ -48,7 +49,7 @@ export class FloorPath {
 
   /** Whether a path is being drawn. */
   get active(): boolean {
-    return this.camera !== null;
+    return this.view !== null;
   }
 
   show(points: readonly Place[]): void {
@@ -62,12 +63,13 @@ export class FloorPath {
     this.update();
   }
 
-  /** Look down at the floor and wait for a line. */
+  /** Look down at the floor around its middle, and wait for a line. */
   start(): void {
     const { camera, orbit, canvas } = this.scene;
     if (this.active) return;
-    this.camera = camera.position.clone();
-    camera.position.set(orbit.target.x, 7.5, orbit.target.z - 5);
+    this.view = [camera.position.clone(), orbit.target.clone()];
+    orbit.target.set(0, orbit.target.y, 1);
+    camera.position.set(0, 7.5, -4);
     orbit.enabled = false;
     [this.typed, this.cursor] = [[], [0, 0]];
     canvas.style.touchAction = "none";
@@ -78,11 +80,12 @@ export class FloorPath {
 
   /** Back to the view of before; null: as it was. */
   stop(points: readonly Place[] | null): void {
-    if (!this.camera) return;
-    this.scene.camera.position.copy(this.camera);
+    if (!this.view) return;
+    this.scene.camera.position.copy(this.view[0]);
+    this.scene.orbit.target.copy(this.view[1]);
     this.scene.orbit.enabled = true;
     this.scene.canvas.style.cursor = "";
-    [this.camera, this.drawn, this.typed] = [null, null, []];
+    [this.view, this.drawn, this.typed] = [null, null, []];
     this.update();
     this.done(points);
   }

@@ -15,6 +15,7 @@ export interface Content {
     skin?: number;
     mesh?: number;
   }[];
+  meshes?: unknown[];
   skins?: { joints: number[]; inverseBindMatrices?: number }[];
   accessors?: Record<string, unknown>[];
   bufferViews?: {
@@ -95,8 +96,10 @@ export class Packing {
     return content.accessors.length - 1;
   }
 
-  /** Put an animation of nodes, which becomes the only one. */
-  animate(name: string, moves: Moves): void {
+  /** Put an animation of nodes, which becomes the only one; its numbers become multiples of `grain`, if that is not 0. */
+  animate(name: string, moves: Moves, grain = 0): void {
+    const rounded = (all: readonly number[]): Float32Array =>
+      Float32Array.from(all, (x) => (grain ? Math.round(x / grain) * grain : x));
     const frames = Math.max(...[...moves.turns.values(), ...moves.places.values()].map((values) => values.length));
     const times = this.add(
       Float32Array.from({ length: frames }, (_, f) => f / moves.fps),
@@ -108,9 +111,8 @@ export class Packing {
       samplers.push({ input: times, output, interpolation: "LINEAR" });
     };
     for (const [node, turns] of moves.turns)
-      put(node, "rotation", this.add(Float32Array.from(turns.flatMap(([w, x, y, z]) => [x, y, z, w])), "VEC4"));
-    for (const [node, places] of moves.places)
-      put(node, "translation", this.add(Float32Array.from(places.flat()), "VEC3"));
+      put(node, "rotation", this.add(rounded(turns.flatMap(([w, x, y, z]) => [x, y, z, w])), "VEC4"));
+    for (const [node, places] of moves.places) put(node, "translation", this.add(rounded(places.flat()), "VEC3"));
     this.content.animations = [{ name, channels, samplers }];
   }
 
@@ -131,6 +133,36 @@ export class Packing {
     }, 28 + padded);
     return result.buffer;
   }
+}
+
+/** The binary part with zeros, which take no room deflated, where only animations have their numbers. */
+export function withoutAnimations(content: Content, binary: Uint8Array): Uint8Array {
+  const { animations, accessors = [], bufferViews = [], meshes, skins, nodes, ...rest } = content;
+  if (bufferViews.some((view) => view.extensions || view.buffer)) return binary;
+  const matrices = ["inverseBindMatrices", "extensions"];
+  const used = [...numbersIn(meshes), ...numbersIn(skins, matrices), ...numbersIn(nodes, matrices)];
+  const lost = new Set(numbersIn(animations, ["samplers"]));
+  for (const number of used) lost.delete(number);
+  const kept = new Set([
+    ...numbersIn(
+      accessors.filter((_, n) => !lost.has(n)),
+      ["bufferView"],
+    ),
+    ...numbersIn([meshes, skins, nodes, rest], ["bufferView"]),
+  ]);
+  const result = new Uint8Array(binary.length);
+  bufferViews.forEach(({ byteOffset = 0, byteLength }, n) => {
+    if (kept.has(n)) result.set(binary.subarray(byteOffset, byteOffset + byteLength), byteOffset);
+  });
+  return result;
+}
+
+/** Numbers anywhere in JSON; `keys`: those below such a key alone. */
+function numbersIn(found: unknown, keys: readonly string[] | null = null): number[] {
+  if (typeof found === "number") return keys ? [] : [found];
+  if (Array.isArray(found)) return found.flatMap((one) => numbersIn(one, keys));
+  if (!found || typeof found !== "object") return [];
+  return Object.entries(found).flatMap(([key, one]) => numbersIn(one, keys?.includes(key) ? null : keys));
 }
 
 /** How nodes of a file move: by their numbers, turns and places in their parents. */

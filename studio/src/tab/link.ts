@@ -5,6 +5,8 @@ import type { Segment } from "../prior/prior";
 
 export interface Project {
   readonly segments: readonly Segment[];
+  /** Whether numbers in the words are left to the network, as in links that do not say `n=1`. */
+  readonly literal: boolean;
   readonly seed: number;
   readonly takes: number;
   /** Points on the floor, x and z in metres, that are walked at even speed; none: nobody asks where. */
@@ -15,6 +17,7 @@ export interface Project {
 
 export const FIRST: Project = {
   segments: [{ text: "a person walks forward and waves", seconds: 4 }],
+  literal: false,
   seed: 1,
   takes: 1,
   path: [],
@@ -29,9 +32,10 @@ export const SHORTEST_OF_SEVERAL = 2;
 const DIGEST = 12;
 
 /** Without the #. */
-export function toAddress({ segments, seed, takes, path, weights }: Project): string {
+export function toAddress({ segments, literal, seed, takes, path, weights }: Project): string {
   const found = new URLSearchParams({ v: "1", seed: String(seed), takes: String(takes) });
   for (const { text, seconds } of segments) found.append("s", `${seconds} ${text}`);
+  if (!literal) found.set("n", "1");
   if (path.length) found.set("p", path.map((at) => at.join(",")).join(" "));
   if (weights) found.set("w", weights.slice(0, DIGEST));
   return found.toString();
@@ -77,5 +81,6 @@ export function ofAddress(hash: string): Project | null {
     });
   if (path.length === 1 || path.length > MOST_POINTS)
     refuse(`its path has ${path.length} points, not 2 to ${MOST_POINTS}`);
-  return { segments, seed: whole("seed", 0, LARGEST), takes: whole("takes", 1, 4), path, weights };
+  const literal = !said.has("n") || whole("n", 0, 1) === 0;
+  return { segments, literal, seed: whole("seed", 0, LARGEST), takes: whole("takes", 1, 4), path, weights };
 }

@@ -13,7 +13,7 @@ import type { Place } from "../prior/path";
 import type { Segment } from "../prior/prior";
 import { Artist } from "./artist";
 import type { Character } from "./character";
-import { exportButtons, nameOf } from "./exports";
+import { exportButtons } from "./exports";
 import {
   FIRST,
   LARGEST,
@@ -27,7 +27,7 @@ import {
   toAddress,
 } from "./link";
 import { chosenFile, onDrop } from "./files";
-import { unread } from "./numbers";
+import { readings, secondsSaid } from "./numbers";
 import { Player } from "./player";
 
 const THEME = "motionloom-theme";
@@ -120,7 +120,7 @@ class Page {
   }
 
   private show(): void {
-    const { progress, says, error, about, drawn, sketch } = this.artist.state.value;
+    const { progress, says, error, about, drawn, sketch, remark } = this.artist.state.value;
     const { segments, seed, takes } = this.project.value;
     const message = this.notice.value || error;
     morph(part("top"), [
@@ -176,25 +176,36 @@ class Page {
           "aria-label": says || "Progress",
         }),
         h("p", { class: "quiet", id: "says", role: "status" }, says || (drawn ? "drawn" : about ? "ready" : "")),
+        remark && h("p", { class: "quiet" }, remark),
         drawn && drawn.clips.length > 1 && this.choose(drawn.clips.length),
-        ...unread(segments).map((one) => h("p", { class: "quiet" }, one)),
-        drawn &&
-          exportButtons(
-            drawn.bodies[this.player.take.value] ?? drawn.bodies[0]!,
-            nameOf(drawn.project),
-            this.character,
-          ),
+        ...this.numbers(),
+        ...(drawn?.misses[this.player.take.value] ?? []).map((one) => h("p", { class: "quiet" }, `This take: ${one}.`)),
+        ...(drawn
+          ? exportButtons(
+              drawn.bodies[this.player.take.value] ?? drawn.bodies[0]!,
+              drawn.project,
+              this.character,
+              (sentence) => (this.notice.value = sentence),
+            )
+          : []),
         h("p", { class: "quiet foot" }, "The address of this page holds the motion: copy it to share it."),
       ].filter((one): one is HTMLElement => one instanceof HTMLElement),
     );
     document.body.dataset.state = progress === null ? (drawn ? "drawn" : about ? "ready" : "failed") : "busy";
     document.body.dataset.shown = sketch.length ? "preview" : drawn ? "motion" : "nobody";
     document.body.dataset.threads = String(this.artist.state.value.threads);
+    document.body.dataset.graphics = String(this.artist.state.value.graphics);
   }
 
   private sentence({ text, seconds }: Segment, index: number): HTMLElement {
     const name = `Sentence ${index + 1}`;
-    const change = (event: Event): void => this.segment(index, { text: (event.target as HTMLTextAreaElement).value });
+    const change = (event: Event): void => {
+      const next = (event.target as HTMLTextAreaElement).value;
+      const said = this.project.value.literal ? null : secondsSaid(next);
+      const least = this.project.value.segments.length > 1 ? SHORTEST_OF_SEVERAL : SHORTEST;
+      const length = said !== null && said !== secondsSaid(text) ? { seconds: Math.max(said, least) } : {};
+      this.segment(index, { text: next, ...length });
+    };
     const send = (event: KeyboardEvent): void => {
       if (event.key !== "Enter" || event.shiftKey) return;
       event.preventDefault();
@@ -217,6 +228,22 @@ class Page {
           textButton("remove", () => this.segment(index, null), { title: `Remove sentence ${index + 1}` }),
       ),
     );
+  }
+
+  /** What is read of numbers in the words, and whether it is kept. */
+  private numbers(): HTMLElement[] {
+    const { segments, literal, path } = this.project.value;
+    const found = readings(segments, path.length > 0);
+    const leave = (): void => this.change({ literal: !literal });
+    const button = textButton("as numbers", leave, {
+      pressed: !literal,
+      title: "Keep to the numbers in the words, or leave them to the network",
+    });
+    const said = `${literal ? "Left to the network" : "Read as"}: ${found.kept.join("; ")}`;
+    return [
+      ...(found.kept.length ? [h("div", { class: "line" }, h("span", { class: "quiet grow" }, said), button)] : []),
+      ...found.left.map((one) => h("p", { class: "quiet" }, one)),
+    ];
   }
 
   private choose(count: number): HTMLElement {
@@ -322,7 +349,8 @@ class Page {
   }
 
   private help(): void {
-    const { about, threads } = this.artist.state.value;
+    const { about, threads, graphics } = this.artist.state.value;
+    const by = graphics ? "the graphics processor (WebGPU)" : `${threads} thread${threads === 1 ? "" : "s"}`;
     const dialog = part<HTMLDialogElement>("help");
     const link = (file: string, text: string): HTMLElement =>
       h("p", {}, h("a", { href: file, target: "_blank" }, text));
@@ -337,7 +365,7 @@ class Page {
         "p",
         {},
         about
-          ? `Weights ${about.name} ${about.weights.slice(0, 12)}; drawn with ${threads} thread${threads === 1 ? "" : "s"}.`
+          ? `Weights ${about.name} ${about.weights.slice(0, 12)}; drawn with ${by}.`
           : "The weights are not there yet.",
       ),
       h("p", {}, about ? `${about.licence}. Made of: ${about.data}` : ""),

@@ -7,6 +7,8 @@ import type { Segment } from "../prior/prior";
 export interface Draw {
   readonly id: number;
   readonly segments: readonly Segment[];
+  /** Whether numbers in the words are left to the network. */
+  readonly literal: boolean;
   readonly seed: number;
   readonly takes: number;
   /** On the ground; fewer than two points: none. */
@@ -27,7 +29,15 @@ export interface About {
 
 export type Said =
   | { readonly kind: "loading"; readonly done: number; readonly of: number }
-  | { readonly kind: "ready"; readonly about: About; readonly threads: number }
+  | {
+      readonly kind: "ready";
+      readonly about: About;
+      readonly threads: number;
+      /** Whether the graphics processor draws. */
+      readonly graphics: boolean;
+      /** Why it does not though there is one; empty: nothing to say. */
+      readonly remark: string;
+    }
   | {
       readonly kind: "sketch";
       readonly id: number;
@@ -41,6 +51,8 @@ export type Said =
       readonly id: number;
       readonly bodies: readonly Body[];
       readonly takes: readonly Float32Array[];
+      /** For each take a sentence for each number in the words that it misses. */
+      readonly misses: readonly (readonly string[])[];
     }
   /** id null: nothing can be drawn at all. */
   | { readonly kind: "failed"; readonly id: number | null; readonly message: string };

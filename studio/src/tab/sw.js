@@ -5,9 +5,12 @@
 
 const NAME = `motionloom-tab-${"VERSION"}`;
 const KEPT = "FILES";
+/** What not everybody needs: kept once it was fetched. */
+const LATER = KEPT.filter((name) => name.includes(".jspi"));
 
 addEventListener("install", (event) => {
-  const add = async () => (await caches.open(NAME)).addAll(["./", ...KEPT.filter((name) => name !== "prior.bin")]);
+  const add = async () =>
+    (await caches.open(NAME)).addAll(["./", ...KEPT.filter((name) => name !== "prior.bin" && !LATER.includes(name))]);
   event.waitUntil(add().then(() => skipWaiting()));
 });
 
@@ -24,8 +27,10 @@ addEventListener("fetch", (event) => {
   if (event.request.method !== "GET" || new URL(event.request.url).origin !== location.origin) return;
   const answer = async () => {
     const own = await caches.open(NAME);
-    const found = (await own.match(event.request, { ignoreSearch: true })) ?? (await fetch(event.request));
+    const kept = await own.match(event.request, { ignoreSearch: true });
+    const found = kept ?? (await fetch(event.request));
     if (found.type === "opaqueredirect" || !found.ok) return found;
+    if (!kept && LATER.some((name) => event.request.url.endsWith(name))) await own.put(event.request, found.clone());
     const headers = new Headers(found.headers);
     headers.set("Cross-Origin-Opener-Policy", "same-origin");
     headers.set("Cross-Origin-Embedder-Policy", "require-corp");

@@ -1,17 +1,18 @@
 /** The prior in a thread of its own, so that the page never stalls. */
 
-import * as ort from "onnxruntime-web/wasm";
-import glue from "onnxruntime-web/ort-wasm-simd-threaded.mjs?url";
-import wasm from "onnxruntime-web/ort-wasm-simd-threaded.wasm?url";
-import { Network, type Runtime } from "../prior/network";
+import type { GroundPose } from "../prior/features";
+import { Failed, Network } from "../prior/network";
+import { rowSeed } from "../prior/noise";
 import { placesOf } from "../prior/person";
 import { startOf } from "../prior/path";
-import { Prior, finished, flat, sketched } from "../prior/prior";
+import { Prior, type Watcher, flat, sketched } from "../prior/prior";
+import { rounded } from "../prior/turns";
+import { measured, missed, nextShare, partsOf, reading } from "../prior/wanted";
 import { type Manifest, Packed } from "../prior/weights";
+import { type Graphics, hasGraphics, runtime, threads } from "./device";
+import { LONGEST } from "./link";
 import type { Draw, Said, Stop } from "./messages";
 
-/** Beyond so many threads such small products gain nothing. */
-const MOST_THREADS = 4;
 const CACHE = "motionloom-weights";
 
 const say = (said: Said): void => postMessage(said);
@@ -60,45 +61,106 @@ async function digest(data: ArrayBuffer): Promise<string> {
   return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-async function open(base: string): Promise<Prior> {
-  const { wasm: settings } = ort.env;
-  settings.numThreads = self.crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, MOST_THREADS) : 1;
-  settings.wasmPaths = { mjs: new URL(glue, base).href, wasm: new URL(wasm, base).href };
-  const packed = await download(base);
-  const network = await Network.open(ort as unknown as Runtime, packed).catch((error: Error) => {
-    throw new Error(`this browser cannot run the network (${error.message.slice(0, 200)}); use a newer one`);
-  });
-  const prior = new Prior(network);
-  const { weights, name, licence, data } = prior.network.packed.about;
-  say({ kind: "ready", about: { weights, name, licence, data }, threads: settings.numThreads });
-  return prior;
+/** The prior of weights that are there; the network's own graph runs on the graphics processor where `graphics` says so. */
+async function open(packed: Packed, base: string, graphics: boolean, remark = ""): Promise<Prior> {
+  const network = await Network.open(await runtime(graphics, base), packed, graphics);
+  const { weights, name, licence, data } = packed.about;
+  say({ kind: "ready", about: { weights, name, licence, data }, threads: threads(), graphics, remark });
+  return new Prior(network);
 }
 
-async function draw(prior: Prior, { id, segments, seed, takes, path }: Draw): Promise<void> {
-  const way = path.length > 1 ? prior.way(segments, path) : null;
-  const begin = way ? startOf(way) : undefined;
-  const watch = async (done: number, of: number, clean: () => Float32Array[]): Promise<void> => {
-    say({
-      kind: "sketch",
-      id,
-      done,
-      of,
-      takes: done * 3 >= of ? clean().map((features) => sketched(features, begin)) : [],
+/** Without the graphics processor, which failed if `why` says so. */
+async function onProcessors(packed: Packed, base: string, why?: Error): Promise<Prior> {
+  const remark = why && `The graphics processor fails (${why.message.slice(0, 120)}); the processors draw instead.`;
+  return open(packed, base, false, remark).catch((error: Error) => {
+    throw new Error(`this browser cannot run the network (${error.message.slice(0, 200)}); use a newer one`);
+  });
+}
+
+async function begin(base: string): Promise<Prior> {
+  const software = new URL(base).searchParams.get("webgpu") === "software";
+  const { gpu } = navigator as { gpu?: Graphics };
+  const [packed, graphics] = await Promise.all([
+    download(base),
+    hasGraphics(gpu, "Suspending" in WebAssembly, software),
+  ]);
+  if (!graphics) return onProcessors(packed, base);
+  return open(packed, base, true).catch((error: Error) => onProcessors(packed, base, error));
+}
+
+/** Tries of a motion whose steps are not as many as the words say. */
+const TRIES = 6;
+
+async function draw(prior: Prior, { id, segments, literal, seed, takes, path }: Draw): Promise<void> {
+  const { fps } = prior;
+  const read = segments.map(({ text }) => (literal ? null : reading(text, fps, LONGEST).amount));
+  let shares = segments.map(() => 1);
+  let best: { off: number; drawn: Said } | null = null;
+  for (let number = 0; number < TRIES; number += 1) {
+    const each = segments.map(({ text, seconds }, n) => partsOf(text, seconds, read[n]!, fps, shares[n]));
+    const parts = each.flat();
+    const way = path.length > 1 ? prior.way(parts, path) : null;
+    const made = await prior.features(
+      parts,
+      number ? rowSeed(seed, number) : seed,
+      takes,
+      watching(id, way ? startOf(way) : undefined),
+      way,
+    );
+    if (!made.every((features) => features.every(Number.isFinite))) throw new Failed("its numbers are none");
+    const bodies = made.map((features) => prior.person(features, parts, way));
+    const places = bodies.map(placesOf);
+    const sizes = places.map((seen) => {
+      let at = 0;
+      return each.map((own, n) => {
+        const begin = at;
+        at += own.reduce((frames, { seconds }) => frames + rounded(seconds * fps), 0);
+        return read[n] && !way ? measured(read[n], seen.slice(begin, at), fps) : null;
+      });
     });
+    const misses = sizes.map((own) => own.flatMap((size, n) => (size !== null && missed(read[n]!, size)) || []));
+    const own = sizes[0]!;
+    const off = read.reduce(
+      (sum, one, n) => sum + (one?.kind === "steps" ? Math.abs(one.size - (own[n] ?? one.size)) : 0),
+      0,
+    );
+    if (!best || off < best.off) best = { off, drawn: { kind: "drawn", id, bodies, takes: places.map(flat), misses } };
+    if (!off || takes > 1) break;
+    shares = shares.map((share, n) => (own[n] === null ? share : nextShare(share, read[n]!.size, own[n]!)));
+  }
+  say(best!.drawn);
+}
+
+/** What the page hears while a motion is drawn; ends the drawing where it is no longer wanted. */
+function watching(id: number, begin: GroundPose | undefined): Watcher {
+  return async (done, of, clean) => {
+    const takes = done * 3 >= of ? clean().map((features) => sketched(features, begin)) : [];
+    say({ kind: "sketch", id, done, of, takes });
     await new Promise((heard) => setTimeout(heard)); // lets a newer wish be heard
     if (newest !== id) throw new Superseded();
   };
-  const made = await prior.features(segments, seed, takes, watch, way);
-  const bodies = made.map((features) => finished(features, prior.fps, begin));
-  say({ kind: "drawn", id, bodies, takes: bodies.map((body) => flat(placesOf(body))) });
+}
+
+/** Draw; where the graphics processor fails at it, without it, and so from then on. */
+async function drawn(data: Draw): Promise<void> {
+  const now = await prior!;
+  try {
+    await draw(now, data);
+  } catch (error) {
+    if (!(error instanceof Failed) || !now.network.graphics) throw error;
+    prior = onProcessors(now.network.packed, place, error);
+    await draw(await prior, data);
+  }
 }
 
 let prior: Promise<Prior> | null = null;
+let place = "";
 let last: Promise<void> = Promise.resolve();
 
 onmessage = ({ data }: MessageEvent<string | Draw | Stop>) => {
   if (typeof data === "string") {
-    prior = open(data);
+    place = data;
+    prior = begin(data);
     prior.catch((error: Error) => say({ kind: "failed", id: null, message: error.message }));
     return;
   }
@@ -109,7 +171,7 @@ onmessage = ({ data }: MessageEvent<string | Draw | Stop>) => {
   newest = data.id;
   last = last.then(async () => {
     try {
-      if (newest === data.id) await draw(await prior!, data);
+      if (newest === data.id) await drawn(data);
     } catch (error) {
       if (!(error instanceof Superseded)) say({ kind: "failed", id: data.id, message: (error as Error).message });
     }

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-"""WebGL is drawn in software; `CHROMIUM_FLAGS` says otherwise, such as --use-gl=angle --use-angle=gl."""
+FLAGS += ("--enable-unsafe-webgpu",)
+"""WebGL and WebGPU are drawn in software; `CHROMIUM_FLAGS` says otherwise, such as --use-gl=angle --use-angle=gl."""
 PATIENCE = 600.0
 """Seconds until a server that starts is given up."""
 TOKEN = "a-token-for-tests"

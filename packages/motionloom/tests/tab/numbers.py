@@ -9,15 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.diffusion import generator, guide
+from motionloom.diffusion.sampling import row_seed
+from motionloom.goals.amount_goal import measured
 from motionloom.goals.goal import start_of
 from motionloom.goals.paths import root_path
 from motionloom.goals.segment import Segment
+from motionloom.goals.timeline import timeline_of
 from motionloom.motion import Motion
-from motionloom.requests.sampling import Sampling
+from motionloom.requests.sampling import LARGEST_SEED, Sampling
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import as_rows
 from motionloom.tasks.control import moved, steered_features
 from motionloom.tasks.long import Track, compose, in_world, long_features
+from motionloom.tasks.supported import supported
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
 
@@ -38,6 +42,21 @@ CHAINS: tuple[tuple[tuple[str, float], ...], ...] = (
 )
 PATH = ((0.5, 1.0), (0.2, 2.6), (1.6, 3.9), (3.0, 3.4))
 """Metres, x and z in the world."""
+WORDED = (
+    "turn left 90 degrees",
+    "a person takes two steps to the left",
+    "a person walks backwards in a half circle to the right",
+    "jump three times",
+    "claps four times",
+)
+"""Sentences whose numbers are kept: a facing, a way, a chain of strokes, a length."""
+BORNE = (
+    "a person walks up the stairs",
+    "a person goes down stairs",
+    "a person climbs a ladder",
+    "she crawls on the floor",
+)
+"""Who gets steps, who is lowered, and who has hands under the floor."""
 ODD_TEXTS = (
     "",
     "  Ünïcode  CAFÉ—naïve\t(won't) stop!? 中文 x́y \u200b\x07 ﬁ İstanbul ΣΊΣΥΦΟΣ",
@@ -73,7 +92,7 @@ def write(prior: Prior, folder: Path, *, precise: bool, weights: dict[str, np.nd
     """
     if weights is not None:
         prior = replace(prior, net=replace(prior.net, weights=weights))
-    found = Numbers()
+    found, sizes = Numbers(), []
     _one_call(prior, found)
     for seed, text in enumerate(SENTENCES if precise else SENTENCES[:1]):
         seconds = 2.0 + 0.35 * seed
@@ -84,13 +103,27 @@ def write(prior: Prior, folder: Path, *, precise: bool, weights: dict[str, np.nd
         _chain(prior, found, f"chain {number}", chain)
     if precise:
         _paths(prior, found)
+        for text in BORNE:
+            [features] = sample_features(prior, [text], [90], seeds=[0])
+            found.add(f"{text}.features", features)
+            found.motion(text, supported(to_motion(features.astype(np.float64), prior.fps)))
+        for text in WORDED:
+            sizes.append(_worded(prior, found, text))
     if precise:
         for seed in (0, 7, 2**40 + 5):
             found.add(f"noise {seed}", generator(seed).standard_normal(200_000, np.float32))
     np.concatenate(found.parts).tofile(folder / "expected.bin")
     assert isinstance(prior.text, MiniLM)
     texts = (*SENTENCES, *ODD_TEXTS)
-    said = {"index": found.index, "sentences": SENTENCES if precise else SENTENCES[:1], "chains": CHAINS, "path": PATH}
+    said = {
+        "index": found.index,
+        "sentences": SENTENCES if precise else SENTENCES[:1],
+        "chains": CHAINS,
+        "path": PATH,
+        "worded": list(zip(WORDED, sizes)) if precise else (),
+        "borne": BORNE if precise else (),
+        "seeds": [(seed, n, str(row_seed(seed, n) % LARGEST_SEED)) for seed in (0, 7, 2**40 + 5) for n in (1, 5)],
+    }
     tokens = [[text, prior.text.ids(text)] for text in as_rows(texts)]
     (folder / "expected.json").write_text(json.dumps({**said, "tokens": tokens, "precise": precise}))
 
@@ -127,3 +160,19 @@ def _paths(prior: Prior, found: Numbers) -> None:
     pieces = long_features(prior, asked, sampling=Sampling(seed=4))
     places = in_world(prior, pieces, deque([None] * len(asked)), track.place(0), track)
     found.add("path of a chain.seen", np.concatenate([piece.positions for piece in places]))
+
+
+def _worded(prior: Prior, found: Numbers, text: str) -> float:
+    """A sentence whose number is kept, as it is sampled first, before anything is counted; what is measured of it."""
+    timeline = timeline_of(text, amounts=True)
+    asked = list(timeline.segments)
+    if len(asked) > 1:
+        features = np.concatenate(list(long_features(prior, asked, sampling=Sampling(seed=6))))
+    elif asked[0].goal is not None:
+        [features] = steered_features(prior, [asked[0].text], asked[0].goal, seeds=[6])
+    else:
+        [features] = sample_features(prior, [asked[0].text], [round(asked[0].seconds * 20)], seeds=[6])
+    found.add(f"{text}.features", features)
+    motion = to_motion(features.astype(np.float64), prior.fps)
+    found.motion(text, motion)
+    return measured(timeline.readings[0].amount, motion.positions())

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 
 from motionloom import load
 from motionloom.io.glb import pack_glb
+from motionloom.kinematics.counts import foot_moves
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
@@ -54,6 +56,38 @@ def test_a_link_is_drawn_on_one_thread_and_again_without_a_network(tab: Tab, pri
     assert np.abs(again.positions() - first.positions()).max() < 1e-3
     assert tab.alert() == ""
     assert not tab.faults
+
+
+@pytest.fixture
+def graphics(browser, address: str) -> Iterator[Tab]:
+    """A tab where processors imitate WebGPU, which the page takes only where its address says so."""
+    context = browser.new_context(accept_downloads=True, service_workers="block")
+    yield Tab(context.new_page(), address)
+    context.close()
+
+
+def test_a_graphics_processor_draws_the_same(graphics: Tab, prior: Prior, tmp_path: Path):
+    graphics.open((0.5, "a person kicks"), seed=3)
+    graphics.drawn()
+    assert graphics.page.evaluate("document.body.dataset.graphics") == "false"
+    assert not any(".jspi-" in url for url in graphics.asked)
+    plain = load(graphics.save("bvh", tmp_path))
+    graphics.address += "?webgpu=software"
+    graphics.open((0.5, "a person kicks"), seed=3)
+    graphics.drawn()
+    assert graphics.page.evaluate("document.body.dataset.graphics") == "true"
+    assert np.abs(load(graphics.save("bvh", tmp_path)).positions() - plain.positions()).max() < 1e-3
+    assert not graphics.faults
+
+
+def test_where_a_graphics_processor_fails_the_processors_draw(graphics: Tab):
+    """What it would need cannot be loaded: the page says so, and draws."""
+    graphics.page.route("**/*.jspi-*.wasm", lambda route: route.abort())
+    graphics.address += "?webgpu=software"
+    graphics.open((0.5, "a person kicks"), seed=3)
+    graphics.drawn()
+    assert graphics.page.evaluate("document.body.dataset.graphics") == "false"
+    assert "The graphics processor fails" in graphics.page.locator("#asked").inner_text()
 
 
 @pytest.mark.parametrize(
@@ -209,8 +243,41 @@ def test_an_own_character_moves_and_is_saved(tab: Tab, tmp_path: Path):
     pairs = [(plain.skeleton.index(name), moved.skeleton.index(name)) for name in SMPL22.names]
     apart = [moved.positions()[:, b] - 1.2 * plain.positions()[:, a] for a, b in pairs]
     assert np.abs(apart).max() < 0.02
+    assert played(tab, "On figure", tmp_path)["character"]
+    assert tab.alert() == ""
     tab.button("remove").click()
     assert tab.page.locator("#canvas[data-character]").count() == 0
+    assert not tab.faults
+
+
+def played(tab: Tab, button: str, folder: Path) -> dict[str, Any]:
+    """What stands in the page that is shared, which plays without a network and asks for nothing."""
+    with tab.page.expect_download() as file:
+        tab.button(button).click()
+    place = folder / "shared" / file.value.suggested_filename
+    file.value.save_as(place)
+    assert place.stat().st_size < 1_500_000
+    alone = tab.page.context.browser.new_context(offline=True)
+    other = Tab(alone.new_page(), place.as_uri())
+    other.page.goto(other.address)
+    other.page.wait_for_selector("body[data-ready=true]")
+    assert other.page.locator("[role=alert]").count() == 0
+    assert all(url.startswith(("file:", "blob:", "data:")) for url in other.asked)
+    assert not other.faults
+    found = json.loads(other.page.locator("#motion").inner_text())
+    alone.close()
+    return found
+
+
+def test_a_motion_is_shared_as_a_page(tab: Tab, tmp_path: Path):
+    """One file, small, whose name and words are those of the sentences, whatever letters they have."""
+    tab.open((2, "a person walks </script><b>"), (2, "jumps & waves"), seed=3)
+    tab.drawn()
+    found = played(tab, "Share", tmp_path)
+    assert found["character"] is None
+    assert [take["name"] for take in found["takes"]] == ["a person walks </script><b>, jumps & waves"]
+    assert found["takes"][0]["people"][0]["frames"] == 80
+    assert tab.alert() == ""
     assert not tab.faults
 
 
@@ -283,7 +350,34 @@ def test_a_second_tab_draws_beside_the_first(tab: Tab, context, address: str):
     other.page.close()
 
 
-def test_numbers_in_the_words_are_told(tab: Tab):
-    tab.open((0.5, "a person walks 10 meters"))
+def test_numbers_in_the_words_are_kept(tab: Tab, tmp_path: Path):
+    """The way is as long as the words say, and the field follows; what is not read is left to the network."""
+    tab.open((4.05, "a person walks 3 meters forward"), n=1)
     tab.drawn()
-    assert '"10 meters" is not measured here' in tab.page.locator("#asked").inner_text()
+    walked = load(tab.save("bvh", tmp_path)).positions()[:, 0, [0, 2]]
+    assert abs(np.linalg.norm(walked[-1] - walked[0]) - 3) < 0.05
+    shown = tab.page.locator("#asked")
+    assert "Read as: 3 m forward, 4.05 s" in shown.inner_text()
+    tab.button("as numbers").click()
+    assert tab.button("as numbers").get_attribute("aria-pressed") == "false"
+    tab.button("Draw").click()
+    tab.page.wait_for_selector("body[data-state=busy]")
+    tab.drawn()
+    assert "n=1" not in tab.page.url
+    tab.button("as numbers").click()
+    tab.page.get_by_label("Sentence 1").fill("turn left 90 degrees")
+    assert tab.page.get_by_label("Seconds", exact=True).input_value() == "2.5"
+    tab.page.get_by_label("Sentence 1").fill("walks 3 meters, then waves")
+    assert '"3 meters" is left to the network' in shown.inner_text()
+    assert not tab.faults
+
+
+def test_steps_are_made_again_until_they_are_as_many(tab: Tab, tmp_path: Path):
+    """The first motion of this seed has two."""
+    tab.open((2.8, "a person takes three steps to the left"), seed=0, n=1)
+    tab.drawn()
+    assert "This take:" not in tab.page.locator("#asked").inner_text()
+    walked = load(tab.save("bvh", tmp_path))
+    places = walked.positions()[:, [walked.skeleton.index(name) for name in SMPL22.names]]
+    assert foot_moves(places, 20.0)[0] == 3
+    assert not tab.faults

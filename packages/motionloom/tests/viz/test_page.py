@@ -19,6 +19,7 @@ from motionloom.cli.sampling import write
 from motionloom.cli.skeletons import Target
 from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
+from motionloom.io.gltf_read import load_glb
 from motionloom.motion import Motion
 from motionloom.retarget import joints22, retarget
 from motionloom.rotations import rotvec_to_quat
@@ -171,6 +172,20 @@ def test_a_character_comes_with_its_motions(tmp_path: Path) -> None:
     (length,) = struct.unpack_from("<I", data, 12)
     assert len(json.loads(data[20 : 20 + length])["animations"]) == 2
     assert np.abs(places(given, 0, 1) - joints22(moved[1])).max() < 0.0003
+
+
+@pytest.mark.usefixtures("viewer")
+def test_a_characters_motion_takes_less_room(tmp_path: Path) -> None:
+    """Its numbers are rounded: nothing that is seen moves by a millimetre."""
+    character, still = load_character(Hero(seed=4).write(tmp_path / "hero.glb")), standing(200, speed=1.0)
+    swing = np.random.default_rng(0).normal(scale=0.02, size=(200, 22, 3)).cumsum(axis=0)
+    moved = retarget(Motion(still.skeleton, 20.0, still.root, rotvec_to_quat(swing)), character.skeleton)
+    given = Reader(page.page([page.Take("", [moved])], character=character)).given
+    shown = tmp_path / "shown.glb"
+    shown.write_bytes(zlib.decompress(base64.b64decode(given["character"])))
+    exact = character.save_clips([(moved, "motion 0")], tmp_path / "exact.glb", replace=True)
+    assert len(given["character"]) < 0.75 * len(page._deflated(exact.read_bytes()))
+    assert 0 < np.abs(load_glb(shown).positions() - load_glb(exact).positions()).max() < 0.001
 
 
 @pytest.mark.usefixtures("viewer")

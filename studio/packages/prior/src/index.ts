@@ -4,7 +4,7 @@ import { JOINTS as NAMES, PARENTS as ABOVE } from "../../../src/body/skeleton";
 import { Network, type Runtime as Built } from "../../../src/prior/network";
 import { startOf } from "../../../src/prior/path";
 import { type Body, REST as OFFSETS, placesOf } from "../../../src/prior/person";
-import { Prior as Sampler, finished, flat, sketched } from "../../../src/prior/prior";
+import { Prior as Sampler, flat, literal, sketched } from "../../../src/prior/prior";
 import { type Manifest, Packed } from "../../../src/prior/weights";
 import { bvh } from "../../../src/tab/bvh";
 import { LARGEST, LETTERS, LONGEST, MOST, SHORTEST, SHORTEST_OF_SEVERAL } from "../../../src/tab/link";
@@ -131,8 +131,9 @@ export class Prior {
       signal?.throwIfAborted();
       progress?.(call, of, () => sketched(takes()[0]!, begin));
     };
-    const [features] = await this.sampler.features(sentences, seed, 1, watch, way);
-    return motionOf(finished(features!, this.sampler.fps, begin), features!);
+    const parts = literal(sentences);
+    const [features] = await this.sampler.features(parts, seed, 1, watch, way);
+    return motionOf(this.sampler.person(features!, parts, way), features!);
   }
 }
 

@@ -188,9 +188,12 @@ def _write_page(arguments: argparse.Namespace, target: Path) -> None:
             motions = [put.put(motions[0], source=str(path))] if len(motions) == 1 else put.put_together(motions)
         takes.append(Take(path.stem, motions))
     write_page(takes, target, character=character)
-    if target.stat().st_size > MAX_BYTES:
+    size = target.stat().st_size
+    if size > MAX_BYTES:
         print(
-            f"note: {target} is {target.stat().st_size / 1e6:.1f} MB with {arguments.skeleton} in it", file=sys.stderr
+            f"note: {target} is {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}, with {arguments.skeleton}, "
+            "its pictures and its motion in it; smaller pictures or a shorter motion make it smaller",
+            file=sys.stderr,
         )
 
 

@@ -37,9 +37,13 @@ MAX_BYTES = 1_500_000
 MAX_PEOPLE = 8
 UNIT = 0.00025
 """Metres: places are whole numbers of it."""
+_GRAIN = 2.0**-13
+"""Quaternions and metres of a character's motion are multiples of it: 0.01 degrees, 0.1 millimetres."""
 _MOTION = '<script type="application/json" id="motion">', "</script>"
 _TITLE = "<title>motionloom</title>"
 _PACKED = {"EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_texture_basisu"}
+_FLOAT = 5126
+"""Of numbers in glTF."""
 _MATRICES = ("inverseBindMatrices", "extensions")
 
 
@@ -184,7 +188,24 @@ def _animated(character: Character, people: Sequence[Motion]) -> str:
     with tempfile.TemporaryDirectory() as folder:
         clips = [(motion, f"motion {number}") for number, motion in enumerate(people)]
         data = character.save_clips(clips, Path(folder) / "character.glb", replace=True).read_bytes()
-    return _deflated(_without(data, before.get("animations", [])))
+    return _deflated(_rounded(_without(data, before.get("animations", []))))
+
+
+def _rounded(data: bytes) -> bytes:
+    """A .glb whose animations have multiples of `_GRAIN`, of which less is left when they are deflated."""
+    (length,) = struct.unpack_from("<I", data, 12)
+    document, result = json.loads(data[20 : 20 + length]), bytearray(data)
+    samplers = [one for animation in document["animations"] for one in animation["samplers"]]
+    for number in sorted({one["output"] for one in samplers}):
+        accessor = document["accessors"][number]
+        view = document["bufferViews"][accessor["bufferView"]]
+        if accessor["componentType"] != _FLOAT or "byteStride" in view or "extensions" in view:
+            continue
+        start = 28 + length + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        count = accessor["count"] * {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        values = np.frombuffer(result, "<f4", count, start)
+        values[:] = np.rint(values / _GRAIN) * _GRAIN
+    return bytes(result)
 
 
 def _without(data: bytes, animations: Sequence[dict]) -> bytes:
