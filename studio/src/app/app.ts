@@ -41,7 +41,8 @@ export function seenTakes(app: App): readonly MotionClip[] {
 export function problemOf(app: App, error: unknown): Problem {
   const { message } = error as Error;
   if (!(error instanceof Refused)) return { message, at: null };
-  return { message: withoutKeys(message), at: placeOf(app.project.value, message, error.where) };
+  const at = placeOf(app.project.value, message, error.where);
+  return { message: withoutKeys(message), at, isFull: error.status === FULL };
 }
 
 /** Show what went wrong: nobody answers, there is no room, or a sentence at its place; `what` begins it. */
@@ -49,8 +50,7 @@ export function fail(app: App, error: unknown, what = ""): void {
   if (error instanceof Unreachable) return app.session.update({ connected: false });
   const problem = problemOf(app, error);
   const message = !what || problem.message.startsWith(what) ? problem.message : `${what}: ${problem.message}`;
-  const isFull = error instanceof Refused && error.status === FULL;
-  app.session.update({ error: { ...problem, message }, ...(isFull ? { saved: "full" as const } : {}) });
+  app.session.update({ error: { ...problem, message } });
 }
 
 /** Seconds that the playhead may go to. */

@@ -178,7 +178,6 @@ export class Saver {
     });
     app.session.subscribe((now, before) => {
       if (before.connected && !now.connected) this.wait();
-      if (before.saved !== "full" && now.saved === "full") this.later();
     });
     this.others.onmessage = () => void this.look();
     document.addEventListener("visibilitychange", () => void this.look());

@@ -54,8 +54,8 @@ export interface Session {
   /** What went wrong last. */
   readonly error: Problem | null;
   readonly connected: boolean;
-  /** `here`: only in this browser; `full`: the server has no room for anything. */
-  readonly saved: "saved" | "saving" | "here" | "full";
+  /** `here`: only in this browser. */
+  readonly saved: "saved" | "saving" | "here";
   readonly stamp: Stamp;
   /** Something else is on the server than what was changed here; nothing is saved until somebody says what is to be. */
   readonly conflict: Conflict | null;

@@ -11,10 +11,10 @@ import { iconButton, textButton } from "./parts";
 export function topBar(app: App, actions: Actions, files: Files, root: HTMLElement): void {
   const render = () => {
     const { value, undoLabel, redoLabel } = app.project;
-    const { connected, saved, drawing, conflict } = app.session.value;
-    const words = { saved: "saved", saving: "saving", here: "kept in this browser", full: "the disk is full" };
-    const state = !connected ? "server away" : conflict ? "not saved" : drawing ? "drawing" : words[saved];
-    const isWrong = !connected || conflict !== null || saved === "full";
+    const { connected, saved, drawing, conflict, error } = app.session.value;
+    const words = { saved: "saved", saving: "saving", here: "kept in this browser" };
+    const wrong = !connected ? "server away" : conflict ? "not saved" : error?.isFull ? "the disk is full" : null;
+    const state = wrong ?? (drawing ? "drawing" : words[saved]);
     morph(root, [
       h("strong", { class: "brand" }, "motionloom"),
       h("input", {
@@ -38,7 +38,7 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
         title: redoLabel === null ? "Redo" : `Redo: ${redoLabel}`,
       }),
       h("span", { class: "grow" }),
-      h("span", { class: `state${isWrong ? " away" : ""}`, role: "status" }, state),
+      h("span", { class: `state${wrong ? " away" : ""}`, role: "status" }, state),
       h("progress", {
         class: drawing ? "" : "idle",
         max: String(drawing?.of ?? 1),
@@ -55,7 +55,8 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
   menuHabits(root);
   app.project.subscribe(render);
   app.session.subscribe((now, before) => {
-    if ((["connected", "saved", "drawing", "conflict"] as const).some((key) => now[key] !== before[key])) render();
+    if ((["connected", "saved", "drawing", "conflict", "error"] as const).some((key) => now[key] !== before[key]))
+      render();
   });
   render();
 }

@@ -14,6 +14,8 @@ export type Place =
 export interface Problem {
   readonly message: string;
   readonly at: Place | null;
+  /** The server's disk has no room for it. */
+  readonly isFull?: boolean;
 }
 
 /** `where`: keys of the timeline, such as `segments[1].goal.joints[0]`, as far as the server knows them. */

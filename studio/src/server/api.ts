@@ -22,6 +22,8 @@ export interface JobState {
   readonly id: string;
   readonly state: string;
   readonly error: string | null;
+  /** The HTTP status that goes with the error. */
+  readonly status: number | null;
   /** How the words were read, and which of them nobody learned. */
   readonly remarks?: readonly string[];
   readonly results: readonly Result[];

@@ -78,7 +78,8 @@ async function finished(id: string, signal: AbortSignal, watcher: Watcher): Prom
 }
 
 function results(state: JobState): readonly Result[] {
-  if (state.state === "failed") throw new Refused(state.error ?? "The job failed and did not say why.", 422);
+  if (state.state === "failed")
+    throw new Refused(state.error ?? "The job failed and did not say why.", state.status ?? 422);
   if (state.state === "cancelled") throw new DOMException("cancelled", "AbortError");
   const { remarks = [] } = state;
   return state.results.map((one) => ({ ...one, remarks: [...remarks, ...(one.remarks ?? [])] }));

@@ -112,6 +112,13 @@ class Skeleton:
             line.append(self.parents[line[-1]])
         return line
 
+    def below(self, joint: int) -> list[int]:
+        """The joint and everything under it, by number."""
+        found = [joint]
+        for one in found:  # which grows meanwhile
+            found += self.children(one)
+        return sorted(found)
+
     def resolve(self, names: Iterable[str]) -> tuple[int, ...]:
         """Joint numbers for a mix of joint and group names, in skeleton order."""
         chosen: set[int] = set()

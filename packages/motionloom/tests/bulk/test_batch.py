@@ -272,7 +272,7 @@ def test_the_folder_of_another_job_is_refused_unless_it_is_to_go(weights: str, f
     others = [{"prompt": "a dog", "seconds": 0.6, "seed": i} for i in range(4)]
     list(batch(rows(4), out, options=asked, where=ONE))
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    with pytest.raises(MotionloomError, match=r"another job: none of 4 .* --force"):
+    with pytest.raises(MotionloomError, match=r"another job: none of the first 4 .* --force"):
         list(batch(others, out, options=asked, where=ONE))
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
     list(batch(others, out, options=asked, where=ONE, force=True))

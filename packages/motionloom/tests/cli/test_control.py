@@ -182,3 +182,10 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
     complaint(capsys)
     assert {path.name for path in Path().iterdir()} == before
     assert not asked
+
+
+def test_a_drawing_that_is_missing_is_named_with_its_option(
+    weights: str, asked: list, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert control(weights, "walk", "--path", "absent.svg") == 2
+    assert "--path: there is no file 'absent.svg'" in complaint(capsys)

@@ -94,11 +94,11 @@ def test_a_session_of_a_script_loops_too(weights: str, people: int) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["predict", "walk.bvh", "--seconds", "0.5"], "and 0.5 s come behind walk.bvh"),
+        (["predict", "walk.bvh", "--seconds", "0.5"], "but only 0.5 s come after walk.bvh"),
         (["predict", "walk.bvh", "--seconds", "31"], "motionloom edit FILE --loop"),
         (["predict", "walk.bvh", "--no-root"], "give one of them"),
         (["predict", "walk.bvh", "--loop-weights", "none.safetensors"], "none.safetensors"),
-        (["switch", "walk.bvh", "walk.bvh", "--blend", "9"], "and 3 s come behind walk.bvh"),
+        (["switch", "walk.bvh", "walk.bvh", "--blend", "9"], "but only 3 s come after walk.bvh"),
         (["live", "script.yaml", "--blend", "2.9"], "a loop of a clip of 3.00 s"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -334,7 +334,7 @@ def test_a_vrm_is_also_written_as_the_glb_that_it_is() -> None:
     [
         (("walk.bvh", "moving.glb", "--skeleton", "hero.glb", "--clip", "wave"), "--clip-name names the one"),
         (("hero.glb", "wave.bvh", "--clip", "wawe"), "did you mean 'wave'?"),
-        (("walk.bvh", "moving.glb", "--skeleton", "hero.gltf"), "it is written as a .gltf"),
+        (("walk.bvh", "moving.glb", "--skeleton", "hero.gltf"), "give a name that ends in .gltf"),
     ],
 )
 def test_what_is_mixed_up_is_said(words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -263,7 +263,7 @@ def test_what_cannot_be_asked_is_answered_with_one_sentence(server: Server, body
 def test_what_only_the_library_can_refuse_fails_the_job_with_its_sentence(server: Server, walk: str) -> None:
     job = server.submit(task="edit", motion=walk, between=[[1.0, 30.0]], prompt="a person waves")
     found = server.wait(job)
-    assert found["state"] == "failed"
+    assert (found["state"], found["status"]) == ("failed", 400)
     assert "no stretch from 1 to 30 s" in found["error"]
 
 

@@ -187,7 +187,7 @@ def test_a_motion_that_finds_no_room_is_told(server: Server) -> None:
         ended = server.wait(server.submit(task="generate", prompt="a person walks", seconds=1.0, steps=2))
     finally:
         resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, NO_LIMIT)
-    assert ended["state"] == "failed"
+    assert (ended["state"], ended["status"]) == ("failed", 507)
     assert "the disk of the project folder is full" in ended["error"]
     assert sorted(place.name for place in (server.project / "motions").iterdir()) == before
 

@@ -176,10 +176,37 @@ def test_a_full_disk_is_told_and_what_finds_no_room_comes_later(studio: Studio, 
         assert sorted(studio.server.folder.rglob("*")) == before
     finally:
         resource.prlimit(pid, resource.RLIMIT_FSIZE, NO_LIMIT)
+    studio.key("r")
     studio.says(studio.page.locator(".state"), "saved")
     assert on_server(studio) == ["a person jumps"]
-    studio.key("r")
     project: dict[str, Any] = studio.project()
     assert project["takes"]
     studio.drop(file)
     studio.page.wait_for_selector(".clip")
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="limits another process's files as Linux does")
+def test_a_disk_with_room_for_words_only_is_called_full(studio: Studio, tmp_path: Path) -> None:
+    """The project's words still fit: as long as a motion did not, the page does not say that all is saved."""
+    file = tmp_path / "walk.bvh"
+    file.write_bytes(studio.download("e"))
+    state, alert = studio.page.locator(".state"), studio.page.locator(".notice[role=alert]")
+    pid = studio.server.process.pid
+    resource.prlimit(pid, resource.RLIMIT_FSIZE, (8000, resource.RLIM_INFINITY))
+    try:
+        studio.drop(file)
+        studio.says(alert, "walk.bvh: the disk of the project folder is full")
+        studio.page.wait_for_timeout(6000)
+        assert state.inner_text() == "the disk is full"
+        alert.get_by_label("Close").click()
+        studio.says(state, "saved")
+        write(studio, "a person jumps")
+        studio.says(alert, "the disk of the project folder is full")
+        while on_server(studio) != ["a person jumps"]:
+            studio.page.wait_for_timeout(100)
+        studio.page.wait_for_timeout(500)
+        assert state.inner_text() == "the disk is full"
+    finally:
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, NO_LIMIT)
+    alert.get_by_role("button", name="Try again").click()
+    assert studio.project()["takes"]

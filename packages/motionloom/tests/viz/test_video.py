@@ -17,6 +17,7 @@ from motionloom.viz import draw
 from motionloom.viz.draw import Camera, capsules, hull
 from motionloom.viz.figure import body_height, figure, joint_sides
 from motionloom.viz.video import draw_sheet, draw_video
+from tests.work import work
 
 
 def standing(frames: int = 20, fps: float = 20.0, *, speed: float = 0.0, turn: float = 0.0) -> Motion:
@@ -62,6 +63,16 @@ def test_sides_of_unnamed_joints_follow_the_rest_pose() -> None:
     named = joint_sides(SMPL22)
     plain = renamed(standing(), [f"joint{i}" for i in range(22)])
     assert joint_sides(plain.skeleton) == named
+
+
+def test_a_deep_skeleton_is_as_much_work_to_study_as_it_is_large() -> None:
+    def studied(joints: int) -> int:
+        names, parents = tuple(f"joint{n}" for n in range(joints)), tuple(range(-1, joints - 1))
+        line = Skeleton(names, parents, np.tile([0.0, 0.01, 0.0], (joints, 1)))
+        motion = Motion(line, 20.0, np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, joints, 1)))
+        return work(lambda: figure(motion))
+
+    assert studied(800) < 9 * studied(100)
 
 
 def test_facing_starts_at_z_and_turns_to_the_left() -> None:

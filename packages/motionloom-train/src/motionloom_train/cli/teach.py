@@ -134,7 +134,7 @@ def _refuse(captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> None
     for one, found in zip(captioned, findings, strict=True):
         for finding in found:
             if finding.fatal:
-                fail(f"{one.path}: {finding.sentence}; leave it out or mend it ('motionloom teach --check' lists all)")
+                fail(f"{one.path}: {finding.sentence}; leave it out or fix it ('motionloom teach --check' lists all)")
             print(f"motionloom: {one.path}: {finding.sentence}", file=sys.stderr)
 
 

@@ -15,7 +15,7 @@ LABORATORY = "motionloom_lab"
 
 def add(subparsers) -> None:
     """Register `train prior`, `train evaluator`, `train control`, `train predictor` and `train duet`."""
-    train = subparsers.add_parser("train", help="train a model from a recipe; goes on where it was stopped")
+    train = subparsers.add_parser("train", help="train a model from a recipe; continues an interrupted run")
     commands = train.add_subparsers(metavar="MODEL", required=True)
     prior = commands.add_parser("prior", help="a text-to-motion prior on a built set")
     _options(prior, "default.toml")

@@ -273,8 +273,8 @@ def _check_same_job(jobs: Jobs, out: Path, options: Options) -> None:
         asked |= {_words(raw, options.seed) for raw in rows}
     if made and None not in asked and not made & asked:
         raise MotionloomError(
-            f"{out} holds motions of another job: none of {len(made):,} looked at is asked for here, and all would go; "
-            "name another folder, or say --force"
+            f"{out} holds motions of another job: none of the first {len(made):,} is in this job; "
+            "name another folder, or replace them with --force"
         )
 
 

@@ -132,7 +132,7 @@ def _verify(arguments: argparse.Namespace) -> int:
         count = len(found.damaged)
         fail(
             f"{count:,} {'file' if count == 1 else 'files'} of {arguments.verify} {'is' if count == 1 else 'are'} "
-            "damaged; run the command that made the batch again: it makes anew what was damaged, and nothing else"
+            "damaged; run the command that made the batch again: it generates the damaged files again, and no others"
         )
     return 0
 
@@ -248,7 +248,7 @@ def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
         else []
     )
     said += (
-        [f"{counts['failed']:,} failed (rows count from 0; mend them; the same command tries again what may go well)"]
+        [f"{counts['failed']:,} failed (rows are counted from 0; correct them and run the same command again)"]
         if counts["failed"]
         else []
     )

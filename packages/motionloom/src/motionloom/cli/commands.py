@@ -42,7 +42,7 @@ class Other:
 OTHERS = {
     "data": Other("turn recordings into a training set", "motionloom_train.cli.data"),
     "teach": Other("teach the shipped weights an action or a style from a few clips", "motionloom_train.cli.teach"),
-    "train": Other("train a model from a recipe; goes on where it was stopped", "motionloom_train.cli.train"),
+    "train": Other("train a model from a recipe; continues an interrupted run", "motionloom_train.cli.train"),
     "evaluate": Other(
         "measure weights: obedience, realism, text metrics; compare runs",
         "motionloom_lab.cli.evaluate",

@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
 )
 from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
+from motionloom.errors import quoted
 from motionloom.requests.control import Control
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         help="joint or group that goes where that of --from goes, repeatable",
     )
     parser.add_argument("--from", dest="clip", type=Path, metavar="CLIP", help="the motion file that --follow follows")
-    parser.add_argument("--path", type=Path, metavar="SVG", help="a drawn line to walk along, seen from above")
+    parser.add_argument("--path", type=Path, metavar="SVG", help="a line to walk along, seen from above")
     parser.add_argument(
         "--width",
         type=float,
@@ -183,8 +184,10 @@ def _drawn(path: Path, width: float | None, frames: int, metre: float) -> "Goal"
     """The line of an SVG file."""
     from motionloom.goals.goal_file import read_goal
 
+    if not path.is_file():
+        fail(f"--path: there is no file {quoted(str(path))}")
     size = {} if width is None else {"width": width}
-    drawing = path.resolve() if path.exists() else path  # a link may lead anywhere
+    drawing = path.resolve()  # a link may lead anywhere
     return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent, metre=metre)
 
 

@@ -59,7 +59,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("--past", nargs=2, type=Path, metavar=("A", "B"), help="motion files of both to go on from")
     parser.add_argument(
-        "--react-to", type=Path, metavar="FILE", help="motion file of the first; only the second is drawn"
+        "--react-to", type=Path, metavar="FILE", help="motion file of the first; only the second is generated"
     )
     parser.add_argument("--timeline", type=Path, metavar="YAML", help="several texts, one after the other")
     parser.add_argument(

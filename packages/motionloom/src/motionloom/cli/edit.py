@@ -37,7 +37,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser = subparsers.add_parser(
         "edit",
         help="change parts of a motion file by words",
-        description=f"Draw parts of a clip ({', '.join(readable())}) anew; the rest stays as it is.",
+        description=f"Generate parts of a clip ({', '.join(readable())}) again; the rest does not change.",
     )
     parser.add_argument("clip", type=Path, metavar="CLIP")
     parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")

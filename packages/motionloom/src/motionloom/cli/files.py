@@ -70,7 +70,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
     info = subparsers.add_parser(
         "info",
-        help="say what a motion file holds and what happens in it",
+        help="print what a motion file contains and what happens in it",
         description="Say what a motion file holds, what happens in it and what looks wrong.",
     )
     info.add_argument("input", metavar="FILE", type=Path)

@@ -93,7 +93,7 @@ def _generate(arguments: argparse.Namespace) -> int:
         if under := motion["stairs"]:
             whose = f"motion {number} " if len(motions) > 1 else ""
             print(
-                f"motionloom: {whose}goes over {under['steps']} steps of {under['rise']:.2f} m, which are not drawn; "
+                f"motionloom: {whose}goes over {under['steps']} steps of {under['rise']:.2f} m, which are not shown; "
                 "--json has their places",
                 file=sys.stderr,
             )

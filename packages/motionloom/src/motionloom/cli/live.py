@@ -56,7 +56,7 @@ def add(subparsers) -> None:
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--clock", action="store_true", help="play it against the time and say how that went")
-    parser.add_argument("--check", action="store_true", help="only say what would be made")
+    parser.add_argument("--check", action="store_true", help="only print what would be generated")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_adapters(parser)
     add_skeleton(parser)

@@ -28,8 +28,8 @@ def check_loop_behind(arguments: argparse.Namespace, past: float, added: float, 
         return
     if arguments.blend > added:
         fail(
-            f"--loop draws the last {arguments.blend:g} s anew, and {added:g} s come behind {arguments.past}, which "
-            f"stays as it is; give --blend {added:g} or less"
+            f"--loop generates the last {arguments.blend:g} s again, but only {added:g} s come after {arguments.past}, "
+            f"which does not change; give --blend {added:g} or less"
         )
     check_loop(arguments, past + added)
     note_loop(arguments, lost)
@@ -38,7 +38,7 @@ def check_loop_behind(arguments: argparse.Namespace, past: float, added: float, 
 def note_loop(arguments: argparse.Namespace, lost: str) -> None:
     """Say on stderr what is ``lost`` where the end is drawn anew, if anything is."""
     if arguments.loop and lost:
-        print(f"note: the last {arguments.blend:g} s are drawn anew for --loop; {lost}", file=sys.stderr)
+        print(f"note: the last {arguments.blend:g} s are generated again for --loop; {lost}", file=sys.stderr)
 
 
 def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text: str, *, seed: int) -> "Motion":

@@ -75,7 +75,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     switch = subparsers.add_parser(
         "switch",
-        help="lead from one motion file into another",
+        help="join two motion files by a transition",
         description="Write PAST, a transition and TARGET as one motion: see docs/predict.md.",
     )
     switch.add_argument("past", type=Path, metavar="PAST")

@@ -136,7 +136,7 @@ class RobotTarget(Target):
 def metres_told(metre: float) -> str:
     """What goals on a robot are, of which ``metre`` is one of the person's that is drawn, for stderr."""
     said = "goals are in the robot's metres"
-    return f"{said}; the person that is drawn has them {1 / metre:.2f} times as far away and as fast"
+    return f"{said}; for the person that is generated, distances and speeds are {1 / metre:.2f} times as large"
 
 
 def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:

@@ -274,7 +274,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
             )
         for out in outs:
             if out.suffix.lower() == ".glb" and not found.writes(out):
-                raise MotionloomError(f"{out} would not hold the character; it is written as a {path.suffix}")
+                raise MotionloomError(f"{out} cannot contain the character; give a name that ends in {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
                 raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
         _note_place(found)

@@ -131,6 +131,7 @@ def _jobs() -> dict[str, Schema]:
             "state": ref("JobState"),
             "progress": _number(minimum=0, maximum=1),
             "error": {"anyOf": [TEXT, _NULL]},
+            "status": {"anyOf": [WHOLE, _NULL], "description": "of the error, as an answer would have it"},
             "remarks": _list(TEXT, description="how the words were read, and which of them nobody learned"),
             "results": _list(ref("Result")),
         }

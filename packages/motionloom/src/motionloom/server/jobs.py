@@ -46,6 +46,8 @@ class Job:
     state: str = "queued"
     done: int = 0
     of: int = 0
+    status: int | None = None
+    """The HTTP status that an error of a request has for the same reason, such as 507 for a full disk."""
     error: str | None = None
     remarks: list[str] = field(default_factory=list)
     """What is to be said of its words."""
@@ -72,6 +74,7 @@ class Job:
                 "task": self.request.task,
                 "state": self.state,
                 "progress": round(min(share, 1.0), 4),
+                "status": self.status,
                 "error": self.error,
                 "remarks": list(self.remarks),
                 "results": list(self.results),
@@ -114,12 +117,12 @@ class Job:
             if not self.finished:
                 self.results.append(result)
 
-    def end(self, state: str, error: str | None = None) -> bool:
+    def end(self, state: str, error: str | None = None, status: int | None = None) -> bool:
         """The last thing that happens to a job; False if it had ended before."""
         with self._lock:
             if self.finished:
                 return False
-            self.state, self.error = state, error
+            self.state, self.error, self.status = state, error, status
             self._final = self._event(state, json.dumps(self.public()))
         self._tell()
         return True

@@ -199,7 +199,7 @@ class Project:
         """Take a file that `part` named into the project; gives its id."""
         with self._lock:
             if sum(1 for _ in self.characters.glob("*.json")) >= self.limits.uploads:
-                raise Refusal(507, f"the project holds {self.limits.uploads} characters already; begin another project")
+                raise Refusal(409, f"the project holds {self.limits.uploads} characters already; begin another project")
             found = secrets.token_hex(8)
             place = self.characters / f"{found}{suffix}"
             os.replace(part, place)

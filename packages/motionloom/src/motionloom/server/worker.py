@@ -148,23 +148,24 @@ class Worker:
                 self._finish(models, jobs, self._progress(jobs))
         except _Cancelled:
             return
-        except (MotionloomError, Refusal) as error:
-            told = full_disk(error) or error
-            problem = self.project.without_paths(getattr(told, "sentence", None) or str(told))
-        except MemoryError:
-            problem = "this takes more memory than there is; ask for less at once"
         except Exception as error:
-            if (full := full_disk(error)) is not None:
-                problem = full.sentence
-            else:
-                log.exception("a job failed")
-                problem = (
-                    f"the server failed ({type(error).__name__}: {str(error)[:200]}); this is a fault of the program"
-                )
-        else:
-            return
-        for job in jobs:
-            job.end("failed", problem)
+            refusal = self._refusal(error)
+            for job in jobs:
+                job.end("failed", refusal.sentence, refusal.status)
+
+    def _refusal(self, error: Exception) -> Refusal:
+        """What clients are told of an error of a job."""
+        if (full := full_disk(error)) is not None:
+            return full
+        if isinstance(error, Refusal):
+            return Refusal(error.status, self.project.without_paths(error.sentence))
+        if isinstance(error, MotionloomError):
+            return Refusal(400, self.project.without_paths(str(error)))
+        if isinstance(error, MemoryError):
+            return Refusal(413, "this takes more memory than there is; ask for less at once")
+        log.error("a job failed", exc_info=error)
+        what = f"{type(error).__name__}: {str(error)[:200]}"
+        return Refusal(500, f"the server failed ({what}); this is a fault of the program")
 
     def _finish(self, models: "Models", jobs: Sequence[Job], progress: Callable[[int, int], None]) -> None:
         from motionloom.server.drawing import batch_key, draw, draw_together

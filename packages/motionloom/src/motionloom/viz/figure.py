@@ -81,16 +81,13 @@ def figure(motion: Motion) -> Figure:
     places = motion.positions()
     height = body_height(skeleton, places)
     centre = body_start(skeleton, places)
-    body = [j for j in range(len(skeleton)) if centre in skeleton.ancestors(j)]
+    body = skeleton.below(centre)
     sides = joint_sides(skeleton)
     head = _head(skeleton, places, body, sides)
     # Eyes and jaw would litter the ball that is the head.
     face = () if head is None else head if head[1] in skeleton.ends else head[1:]
-    bones = tuple(
-        (skeleton.parents[j], j)
-        for j in body
-        if j != centre and (j in face or not set(skeleton.ancestors(j)[1:]) & set(face))
-    )
+    hidden = {below for j in face for below in skeleton.below(j)} - set(face)
+    bones = tuple((skeleton.parents[j], j) for j in body if j != centre and j not in hidden)
     limbs = _limbs(skeleton, places, bones, sides)
     floor = _floor(places[:, body], height)
     forward = _forward(places, limbs, sides)
@@ -188,15 +185,17 @@ def _limbs(
     """Arms and legs as (shoulder or hip, elbow or knee, is an arm): each begins with its two longest bones in a row."""
     lengths = _lengths(skeleton, places)
     height = np.median(places[..., 1], axis=0)
+    depth = [0] * len(skeleton)
+    for joint, parent in enumerate(skeleton.parents[1:], start=1):
+        depth[joint] = depth[parent] + 1
     found: list[tuple[int, int, bool]] = []
     for start in (c for p, c in bones if sides[c] != 0 and sides[p] == 0):
-        inside = [j for j in range(len(skeleton)) if start in skeleton.ancestors(j)]
-        pairs = [(p, j) for j in inside if (p := skeleton.parents[j]) in inside]
-        pairs = [(p, j) for p, j in pairs if skeleton.parents[p] >= 0 and skeleton.children(j)]
+        inside = skeleton.below(start)
+        pairs = [(skeleton.parents[j], j) for j in inside if j != start and skeleton.children(j)]
         if not pairs:
             continue
         best = max(pairs, key=lambda pair: lengths[pair[1]] + max(lengths[c] for c in skeleton.children(pair[1])))
-        tip = max(inside, key=lambda j: len(skeleton.ancestors(j)))
+        tip = max(inside, key=depth.__getitem__)
         rest_drop = height[tip] - height[start]
         found.append((best[0], best[1], bool(rest_drop > -0.35 * np.ptp(height))))
     return found
@@ -206,7 +205,8 @@ def _chest(skeleton: Skeleton, arms: tuple[int, ...], centre: int) -> tuple[int,
     """Shoulders and the joint where their lines meet."""
     if len(arms) < 2:
         return ()
-    shared = [j for j in skeleton.ancestors(arms[0]) if all(j in skeleton.ancestors(a) for a in arms[1:])]
+    others = [set(skeleton.ancestors(arm)) for arm in arms[1:]]
+    shared = [j for j in skeleton.ancestors(arms[0]) if all(j in other for other in others)]
     return (*arms, shared[0]) if shared and shared[0] != centre else arms
 
 
@@ -230,8 +230,8 @@ def _hold(values: Array, good: NDArray[np.bool_]) -> Array:
 
 
 def _head(skeleton: Skeleton, places: Array, body: list[int], sides: tuple[int, ...]) -> tuple[int, int] | None:
-    named = [j for j in body if "head" in skeleton.names[j].lower() and skeleton.parents[j] in body]
-    tips = [j for j in body if not skeleton.children(j) and sides[j] == 0 and skeleton.parents[j] in body]
+    named = [j for j in body[1:] if "head" in skeleton.names[j].lower()]
+    tips = [j for j in body[1:] if not skeleton.children(j) and sides[j] == 0]
     if named:
         joint = named[0]
         below = [c for c in skeleton.children(joint) if c in skeleton.ends or "head" in skeleton.names[c].lower()]
@@ -282,11 +282,15 @@ def _radii(
     """(bones, 2): thick thighs, thinner further out, never thicker than a bone's length allows."""
     lengths = _lengths(skeleton, places)
     starts = {joint: (0.030 if arm else 0.046) for joint, _, arm in limbs}
+    widths: list[tuple[float, int] | None] = [None] * len(skeleton)
+    """Of a joint's bone: that at the start of its limb, and how many bones further out it is."""
+    for joint, parent in enumerate(skeleton.parents[1:], start=1):
+        above = widths[parent]
+        widths[joint] = (starts[parent], 0) if parent in starts else above and (above[0], above[1] + 1)
     radii = np.empty((len(bones), 2))
     for i, (_, child) in enumerate(bones):
-        line = skeleton.ancestors(child)[1:]
-        at = next((k for k, j in enumerate(line) if j in starts), None)
-        widest = 0.026 if at is None else starts[line[at]] * 0.76**at
+        first, out = widths[child] or (0.026, 0)
+        widest = first * 0.76**out
         thick = np.clip(0.23 * lengths[child], 0.009 * height, widest * height)
         radii[i] = thick, 0.74 * thick
     return radii
