@@ -71,10 +71,7 @@ def train_prior(
         heights=recipe.heights,
         device=world.device,
     )
-    say(
-        f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
-        f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded"
-    )
+    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {_size(motions)}")
     for line in changed(folder, recipe) if world.rank == 0 else ():
         say(f"going on with another recipe than before: {line}")
     place, known = folder / f"{recipe.name}.safetensors", known_table(motions, text)
@@ -107,6 +104,13 @@ def train_prior(
         say=say,
     )
     return place
+
+
+def _size(motions: MotionSet) -> str:
+    return (
+        f"{len(motions.items):,} described stretches, {len(motions.texts):,} sentences, "
+        f"{motions.minutes:.0f} minutes recorded"
+    )
 
 
 def restandardised(motions: MotionSet, mean: Tensor, std: Tensor) -> MotionSet:

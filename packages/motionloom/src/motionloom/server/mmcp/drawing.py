@@ -98,20 +98,21 @@ class _Sampler:
     models: Models
     sampling: Sampling
 
-    def run(self, task: str, values: Any, seed: int, **named: Any) -> Motion:
-        """The one motion of a request."""
-        plan = Plan(task=task, values=values, sampling=replace(self.sampling, seed=seed), **named)
-        [made] = run(plan, self.models)
+    def run(self, plan: Plan, seed: int) -> Motion:
+        """The one motion of a plan."""
+        [made] = run(replace(plan, sampling=replace(self.sampling, seed=seed)), self.models)
         return made.people[0]
 
     def compose(self, segments: Sequence[Segment], seed: int, path: Goal | None = None) -> Motion:
         """Segments, one after the other."""
         timeline = Timeline(tuple(segments), path=path)
-        return self.run("compose", Compose(timeline=timeline), seed, timeline=timeline)
+        values = Compose(timeline=timeline)
+        return self.run(Plan(task="compose", values=values, sampling=self.sampling, timeline=timeline), seed)
 
-    def edit(self, motion: Motion, seed: int, **changes: Any) -> Motion:
-        """A motion changed as these fields of `Edit` say, without words."""
-        return self.run("edit", Edit(motion=motion, **changes), seed, people=(motion,))
+    def edit(self, values: Edit, seed: int) -> Motion:
+        """A motion changed as a request without words says."""
+        people = (values.motion,)
+        return self.run(Plan(task="edit", values=values, sampling=self.sampling, people=people), seed)
 
 
 def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, seed: int) -> Motion:
@@ -248,7 +249,7 @@ def _performance(sampler: _Sampler, segment: Any, rig: Rig, frames: int, seed: i
         raise MotionloomError(f"a motion to be like is {len(clip) / FPS:.2f} s long; at least 0.4 s are needed")
     missing = frames - len(clip)
     longer = max(missing, 2) / FPS if missing > 0 else 0.0
-    changed = sampler.edit(clip, seed, between=((0.0, clip.seconds),), strength=VARIED, extend=longer)
+    changed = sampler.edit(Edit(motion=clip, between=((0.0, clip.seconds),), strength=VARIED, extend=longer), seed)
     return changed.frames(0, frames)
 
 
@@ -259,13 +260,13 @@ def _joined(sampler: _Sampler, before: Motion, behind: Motion, seed: int) -> Mot
     whole = concatenated(before, behind)
     around = min(SEAM, before.seconds / 2, behind.seconds / 2)
     span = (seam - around, min(seam + around, whole.seconds))
-    return sampler.edit(whole, seed, between=(span,))
+    return sampler.edit(Edit(motion=whole, between=(span,)), seed)
 
 
 def _looped(sampler: _Sampler, motion: Motion, seed: int) -> Motion:
     """A cycle: its last frame is its first one again, moved on by the way of one cycle."""
     blend = min(1.0, max(motion.seconds / 3, 0.1))
-    cycle = sampler.edit(motion.frames(0, len(motion) - 1), seed, loop=True, blend=blend)
+    cycle = sampler.edit(Edit(motion=motion.frames(0, len(motion) - 1), loop=True, blend=blend), seed)
     last = cycle.frames(0, 1)
     step = (cycle.root[1] - cycle.root[0]) * np.array([1.0, 0.0, 1.0])
     place = cycle.root[-1:] + step
