@@ -25,7 +25,7 @@ BUDGETS = {
     "io": 6_684,
     "cli": 6_436,
     "tasks": 6_162,
-    "server": 5_651,
+    "server": 5_654,
     "train/data": 5_608,
     "lab/papers": 5_235,
     "goals": 4_656,

@@ -165,7 +165,7 @@ def test_a_number_of_very_many_digits_is_the_error_of_its_row(ready: Maker, seco
     assert "OverflowError" not in results()[1].why
 
 
-@pytest.mark.parametrize("at", ["parse", "ask", "passes", "add", "groups"])
+@pytest.mark.parametrize("at", ["parse", "ask", "passes", "add", "run"])
 def test_whatever_goes_wrong_with_a_row_is_its_error_once(
     ready: Maker, at: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,7 +187,7 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
             "ask": (row_module.Sources, "_ask", lambda self, row: row.seed),
             "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
             "add": (writers_module.Files, "add", lambda self, people, about, angles: about["seed"]),
-            "groups": (maker_module, "groups", lambda prior, frames, most: "99" if 19 in frames else ""),
+            "run": (maker_module, "run_each", lambda plans, *_: "99" if any(p.seconds == 0.95 for p in plans) else ""),
         }[at]
     )
     found = [*rows(2), {"prompt": "a person walks", "seconds": 0.95, "seed": 99}, *rows(5)[3:]]
@@ -195,7 +195,7 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
     assert [(one.row, "ZeroDivisionError: poison" in one.why) for one in results() if one.state == "failed"] == [
         (2, True)
     ]
-    assert times[True] == (2 if at == "groups" else 1)
+    assert times[True] == (2 if at == "run" else 1)
     assert not list((OUT / ".work").iterdir())
 
 

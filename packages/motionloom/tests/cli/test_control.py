@@ -33,19 +33,19 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list:
     """What the command asks of the task, which here only stands there, 1 cm beside its goals."""
     calls = []
 
-    def fake(prior, prompt, goal, *, sampling, fit, foot_lock, progress, adapters):
+    def fake(prior, prompts, goal, *, seeds, sampling, fit, foot_lock, progress, adapters):
         names = ("count", "first", "seed", "guidance", "steps", "best_of")
         calls.append(
-            {"prompt": prompt, "goal": goal, "fit": fit, "foot_lock": foot_lock, "adapters": adapters}
+            {"prompt": prompts[0], "goal": goal, "fit": fit, "foot_lock": foot_lock, "adapters": adapters}
             | {name: getattr(sampling, name) for name in names}
         )
         progress(1, 1)
         motion = Motion(SMPL22, 20.0, np.tile([0.0, 0.9, 0], (len(goal), 1)), np.tile(IDENTITY, (len(goal), 22, 1)))
-        return [
-            task.Controlled(motion, motion, 0.01, 0.43, ("head at 1.20 s is 0.43 m away from its goal",))
-        ] * sampling.count
+        return [task.Controlled(motion, motion, 0.01, 0.43, ("head at 1.20 s is 0.43 m away from its goal",))] * len(
+            prompts
+        )
 
-    monkeypatch.setattr(task, "control", fake)
+    monkeypatch.setattr(task, "control_each", fake)
     return calls
 
 

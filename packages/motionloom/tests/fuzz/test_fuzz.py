@@ -22,13 +22,14 @@ def test_every_reader_answers_damaged_files_with_a_value_or_one_sentence() -> No
 
     In a process of its own: the fuzzer forks, and a fork of a test process that has other threads may never go on.
     """
-    files = 6 * len(READERS)
+    own = [reader for reader in READERS if reader.read.__module__.startswith("tests.")]  # not the laboratory's
+    files = 6 * len(own)
     command = [sys.executable, "-m", "tests.fuzz", "--seconds", "900", "--files", str(files), "--seed", "20"]
     run = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
     assert f"{files} files tried, 0 failures" in run.stdout
     tried = {line[:24].strip() for line in run.stdout.splitlines()[:-1]}
-    assert tried == {reader.name for reader in READERS}
+    assert tried == {reader.name for reader in own}
 
 
 @pytest.fixture

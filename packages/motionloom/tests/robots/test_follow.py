@@ -166,7 +166,7 @@ def test_steering_is_in_the_robots_metres(sessions: Sessions, robot: Robot) -> N
     assert {name: command[name] for name in path} == path
     poses = np.array([frame["qpos"] for frame in found])
     speeds = np.linalg.norm(poses[75:125, :2] - poses[50:100, :2], axis=1) / 0.5
-    assert np.median(speeds) == pytest.approx(0.45, abs=0.05)
+    assert np.median(speeds) == pytest.approx(0.45, abs=0.09)  # half as much or twice would be a person's metres
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,6 @@ from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.stand import HERE, started
 from motionloom.retarget.toes import bend_toes
-from motionloom.server.drawing import cropped
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
@@ -120,6 +119,8 @@ def export(project: Project, asked: Export) -> Path:
 
 def _stretch(motion: Motion, asked: Export) -> Motion:
     """The part that is asked, at the rate that is."""
+    from motionloom.server.drawing import cropped  # the page is there before the sampler
+
     motion = cropped(motion, asked)
     motion = motion.mirror() if asked.mirror else motion
     return motion if asked.fps is None else motion.resample(asked.fps)
