@@ -43,6 +43,7 @@ export function readPackage(folder: string): Package {
 /** Works of others inside of packages, by the file that they are in; their texts lie in `licences`. */
 const INSIDE: Readonly<Record<string, Omit<Package, "text">>> = {
   "meshopt_decoder.module.js": { name: "meshoptimizer", version: "in three.js", licence: "MIT" },
+  "DRACOLoader.js": { name: "draco", version: "in three.js", licence: "Apache-2.0" }, // its decoder is a file beside it
 };
 
 /** What a module is, if it is somebody else's than its package; null: it is not. */

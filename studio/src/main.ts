@@ -3,28 +3,36 @@
 import "./style/colors.css";
 import "./style/base.css";
 import "./style/buttons.css";
+import "./style/dialogs.css";
 import "./style/help.css";
 import "./style/live.css";
 import "./style/panels.css";
 import "./style/timeline.css";
+import "./style/narrow.css";
 import { type Parts, actions, nudged } from "./app/actions";
-import type { App } from "./app/app";
+import { type App, faultOf } from "./app/app";
 import { Deeds } from "./app/deeds";
 import { h } from "./app/dom";
 import { Drawer } from "./app/drawing";
+import { remember, remembered } from "./app/memory";
 import { Files } from "./app/files";
 import { Saver, restored } from "./app/saving";
 import { keyOf } from "./app/keys";
 import { Live, type LiveState } from "./app/live";
+import { Projects } from "./app/projects";
 import { newSession } from "./app/session";
 import { Signal } from "./app/signal";
 import type { MotionClip } from "./body/clip";
 import { stageBar, topBar, transport } from "./panels/bars";
 import { inspector } from "./panels/inspector";
+import { jointDialog } from "./panels/joints";
 import { livePanel } from "./panels/live";
 import { drops, help, notices, takeNames } from "./panels/overlays";
+import { palette } from "./panels/palette";
+import { historyPictures, nameDialog, recentProjects } from "./panels/pictures";
+import { splits } from "./panels/splits";
+import { startCard } from "./panels/start";
 import { History } from "./project/history";
-import { addSegment } from "./project/timeline";
 import { Stage } from "./stage/stage";
 import { listen } from "./timeline/gestures";
 import { TimelineView } from "./timeline/view";
@@ -47,7 +55,7 @@ async function start(): Promise<void> {
   setTheme(localStorage.getItem(THEME) ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
   const begin = await restored();
   const app: App = {
-    project: new History(begin.project),
+    project: new History(begin.project, await remembered(begin.stamp.id, begin.project)),
     session: newSession(),
     denoising: new Signal<readonly MotionClip[]>([]),
     live: new Signal<LiveState | null>(null),
@@ -55,13 +63,15 @@ async function start(): Promise<void> {
   const stage = new Stage(app, part<HTMLCanvasElement>("canvas"), isDark());
   const drawer = new Drawer(app);
   const deeds = new Deeds(app, drawer);
-  const files = new Files(app, deeds);
   const live = new Live(app, drawer, deeds, stage.scene);
   stage.sentTo = (place) => live.go(place);
   const saver = new Saver(app, begin, () => {
     drawer.loadTakes();
     drawer.schedule();
   });
+  remember(app.project, () => app.session.value.stamp.id);
+  const projects = new Projects(app, saver, drawer);
+  const files = new Files(app, deeds, projects);
   const timeline = new TimelineView(app, part("tracks"), {
     write: (id, text, second) => deeds.write(id, text, second),
     written: () => drawer.schedule(),
@@ -71,30 +81,33 @@ async function start(): Promise<void> {
     drawer,
     deeds,
     files,
+    projects,
     live,
     stage,
     choose: drops(files, document.body),
     editWords: (id) => timeline.edit(id),
     zoom: (factor) => timeline.zoom(factor),
+    fit: () => timeline.fit(),
     toggleTheme: () => {
       setTheme(isDark() ? "light" : "dark");
       localStorage.setItem(THEME, isDark() ? "dark" : "light");
       stage.look(isDark());
+      timeline.render();
     },
   };
   show(parts, timeline, saver);
   drawer.loadTakes();
   drawer.schedule();
-  app.session.update({ playing: begin.isNew || app.project.value.takes.length > 0 });
+  app.session.update({ playing: begin.isNew || app.project.value.takes.length > 0, welcome: begin.isNew });
   document.body.dataset.ready = "true";
   performance.mark("ready");
 }
 
 /** The panels, each in its place of the page. */
 function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
-  const { app, drawer, deeds, files, live } = parts;
+  const { app, drawer, deeds, files, projects, live, stage } = parts;
   const all = actions(parts);
-  topBar(app, all, files, part("top"));
+  topBar(app, all, part("top"));
   stageBar(app, all, part("tools"), part("views"));
   transport(app, all, part("transport"));
   inspector(app, all, deeds, part("inspector"));
@@ -106,22 +119,28 @@ function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
   );
   takeNames(app, part("names"));
   livePanel(app, live, part("live"));
-  help(app, all, part<HTMLDialogElement>("help"));
+  help(app, all);
+  palette(app, all);
+  historyPictures(app);
+  recentProjects(app, projects);
+  nameDialog(app, projects);
+  jointDialog(app, files);
+  startCard(app, projects, part("start"), (pixels) => stage.scene.lift(pixels));
+  splits();
   listen(app, timeline, part("tracks"));
   const busy = () => {
     const { drawing, pending } = app.session.value;
     part("stage").setAttribute("aria-busy", String(drawing !== null || pending));
+    document.body.toggleAttribute("data-sheet", app.session.value.sheet);
   };
   app.session.subscribe(busy);
   busy();
   part("tracks").addEventListener("click", (event) => {
-    if (!(event.target as Element).closest("[data-act=add]")) return;
-    app.project.change("add a block", (old) => addSegment(old));
-    timeline.edit(app.project.value.segments.at(-1)!.id);
+    if ((event.target as Element).closest("[data-act=add]")) all.add!.run();
   });
   const byKey = new Map(Object.values(all).flatMap((action) => action.keys.map((key) => [key, action] as const)));
   addEventListener("keydown", (event) => {
-    if (isTyping(event)) return;
+    if (isTyping(event) || document.querySelector("dialog[open]")) return;
     if (live.press(event)) return event.preventDefault();
     if (live.isOn && !LIVE_TOO.some((name) => all[name]!.keys.includes(keyOf(event)))) return;
     if (numbered(event, parts)) return;
@@ -129,10 +148,13 @@ function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
     const isButton = event.target instanceof HTMLElement && event.target.matches("button, summary");
     if (isButton && (event.key === "Enter" || event.key === " ")) return;
     if (nudged(event, parts)) return event.preventDefault();
-    if (!action) return;
+    if (!action || isCopying(event)) return;
     event.preventDefault();
     action.run();
   });
+  const broke = (error: unknown) => app.session.update({ error: { message: faultOf(error), at: null } });
+  addEventListener("error", (event) => event.error && broke(event.error));
+  addEventListener("unhandledrejection", (event) => broke(event.reason));
   addEventListener("keyup", (event) => live.release(event));
   addEventListener("blur", () => live.letGo());
 }
@@ -144,7 +166,13 @@ const LIVE_TOO = ["live", "follow", "above", "theme", "help"];
 function isTyping(event: KeyboardEvent): boolean {
   const { target } = event;
   if (!(target instanceof HTMLElement) || !target.matches("input, textarea, select")) return false;
+  if (target.closest("[hidden], dialog:not([open])")) return false;
   return !(event.ctrlKey || event.metaKey) || "acvx".includes(event.key.toLowerCase());
+}
+
+/** Words of the page that are marked are what Ctrl+C copies. */
+function isCopying(event: KeyboardEvent): boolean {
+  return keyOf(event) === "Ctrl+C" && getSelection()?.isCollapsed === false;
 }
 
 /** A number chooses a future or keeps a take. */
@@ -160,7 +188,8 @@ function numbered(event: KeyboardEvent, { app, deeds }: Parts): boolean {
 }
 
 start().catch((error: Error) => {
-  part("notices").replaceChildren(
-    h("p", { class: "notice", role: "alert" }, `The page cannot start: ${error.message}`),
-  );
+  const why = /webgl/i.test(error.message)
+    ? "this browser shows no 3D pictures (WebGL); turn on hardware acceleration, or use another browser."
+    : faultOf(error);
+  part("notices").replaceChildren(h("p", { class: "notice", role: "alert" }, `The page cannot start: ${why}`));
 });

@@ -3,9 +3,10 @@ import { changeTarget, keepWay, needsWay, putPose, putTarget, setPath, shiftTarg
 import { motionClip } from "../src/body/clip";
 import { pathPoint } from "../src/project/path";
 import { type Project, type Vec3, exampleProject, keptTake, segment } from "../src/project/model";
-import { goalOf, timelineOf } from "../src/project/goals";
-import { plan, planKey } from "../src/project/plan";
+import { STANDS, type SegmentJson, goalOf, timelineOf } from "../src/project/goals";
+import { plan, planKey, stale } from "../src/project/plan";
 import { freeze, freezeRest, setPeople, write } from "../src/project/timeline";
+import type { ComposeRequest } from "../src/server/types";
 
 const TAKE = { motion: "m1", seed: 1, seconds: 6.5, people: 1, how: "drawn" };
 const STANDING: Vec3[] = Array.from({ length: 22 }, (_, joint) => [0, joint / 20, 0]);
@@ -88,13 +89,28 @@ describe("what is drawn", () => {
     ]);
   });
 
-  it("says which block has no words", () => {
+  it("has somebody stand in a block without words, and asks for words where no block has any", () => {
     const project = { ...exampleProject(), segments: [segment("walk", 2), segment(" ", 2)] };
-    const at = { kind: "segment", id: project.segments[1]!.id };
-    expect(plan(project)).toEqual({
-      jobs: [],
-      missing: { message: "Block 2 has no words yet; say what the person does.", at },
-    });
+    const [job] = plan(project).jobs as ComposeRequest[];
+    const { segments } = job!.timeline as { segments: SegmentJson[] };
+    expect(segments.map((one) => one.text)).toEqual(["walk", STANDS]);
+    const empty = { ...project, segments: [segment(" ", 2), segment("", 2)] };
+    const at = { kind: "segment", id: empty.segments[0]!.id };
+    const message = "No block has words yet; say what the person does.";
+    expect(plan(empty)).toEqual({ jobs: [], missing: { message, at } });
+  });
+
+  it("tells which blocks show the motion of other words", () => {
+    const [walk, wave, jump] = [segment("walk", 2), segment("wave", 2), segment("jump", 2)];
+    const take = { motion: "a", seed: 0, seconds: 6, people: 1, how: "drawn" };
+    const project = { ...exampleProject(), segments: [walk, wave, jump], takes: [take] };
+    const drawn = { ...project, drawn: planKey(project) };
+    expect(stale(drawn)).toEqual(new Set());
+    const changed = { ...drawn, segments: [walk, { ...wave, text: "bow" }, jump] };
+    expect(stale(changed)).toEqual(new Set([wave.id]));
+    const more = segment("run", 1);
+    expect(stale({ ...drawn, segments: [walk, more, wave, jump] })).toEqual(new Set([more.id]));
+    expect(stale({ ...changed, takes: [] })).toEqual(new Set());
   });
 
   it("is only what is not frozen, block by block", () => {

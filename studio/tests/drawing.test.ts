@@ -13,15 +13,20 @@ import { write } from "../src/project/timeline";
 
 /** Stands for the server: jobs wait until a test lets them go on. */
 class Jobs {
+  /** Motions that the server no longer has. */
+  readonly lost = new Set<unknown>();
   readonly asked: Record<string, unknown>[] = [];
   private readonly streams: ReadableStreamDefaultController<Uint8Array>[] = [];
 
   answer(path: string, init: RequestInit = {}): Response {
     if (path === "jobs") {
-      this.asked.push(JSON.parse(String(init.body)) as Record<string, unknown>);
+      const job = JSON.parse(String(init.body)) as Record<string, unknown>;
+      if (this.lost.has(job.kept_from)) return Response.json({ error: "there is no such motion" }, { status: 404 });
+      this.asked.push(job);
       return Response.json({ id: String(this.asked.length - 1) });
     }
-    if (path.startsWith("motions/")) return Response.json({ fps: 20, people: [{ positions: base64(130) }] });
+    if (path.startsWith("motions/"))
+      return new Response(new Float32Array(130 * POSE), { headers: { "Motion-Fps": "20", "Motion-People": "1" } });
     if (!path.endsWith("/events")) return Response.json({});
     const body = new ReadableStream<Uint8Array>({ start: (one) => void this.streams.push(one) });
     init.signal?.addEventListener("abort", () => this.streams.at(-1)!.error(init.signal!.reason));
@@ -34,7 +39,8 @@ class Jobs {
 
   end(): void {
     const number = this.asked.length - 1;
-    const results = [{ id: `motion${number}`, seed: 1, seconds: 6.5, frames: 130, people: 1 }];
+    const measures = this.asked[number]!.kept_from ? { redrawn: [1] } : {};
+    const results = [{ id: `motion${number}`, seed: 1, seconds: 6.5, frames: 130, people: 1, measures }];
     this.send("done", { id: String(number), state: "done", error: null, results });
   }
 
@@ -100,6 +106,36 @@ describe("a draw", () => {
     drawer.again();
     await vi.waitFor(() => expect(jobs.asked).toHaveLength(2));
     expect(jobs.asked[1]).toMatchObject({ levels: 6 });
+  });
+
+  it("keeps the blocks of the motion that is there, as long as the server has it", async () => {
+    const page = begun();
+    const { app, jobs, drawer } = page;
+    drawer.schedule();
+    await drawn(page);
+    expect(jobs.asked[0]).not.toHaveProperty("kept_from");
+    const wave = (text: string) =>
+      app.project.change("write", (old) => write(old, old.segments[1]!.id, text), { typed: true });
+    wave("a person bows");
+    await drawn(page);
+    expect(jobs.asked[1]).toMatchObject({ task: "compose", kept_from: "motion0" });
+    expect(app.project.value.takes).toMatchObject([{ motion: "motion1", how: "changed" }]);
+    drawer.all();
+    await drawn(page);
+    expect(jobs.asked[2]).not.toHaveProperty("kept_from");
+    expect(app.project.value.takes).toMatchObject([{ motion: "motion2", how: "drawn" }]);
+    wave("a person jumps");
+    await drawn(page);
+    expect(jobs.asked[3]).toMatchObject({ kept_from: "motion2" });
+    jobs.lost.add("motion3");
+    wave("a person kicks");
+    await drawn(page);
+    expect(jobs.asked).toHaveLength(5);
+    expect(jobs.asked[4]).not.toHaveProperty("kept_from");
+    app.project.change("draw four takes", (old) => ({ ...old, count: 4 }));
+    await vi.waitFor(() => expect(jobs.asked).toHaveLength(6));
+    expect(jobs.asked[5]).not.toHaveProperty("kept_from");
+    drawer.stop();
   });
 
   it("of four takes shows all of them on their way, each once where pictures are slow", async () => {

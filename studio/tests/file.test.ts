@@ -22,7 +22,11 @@ describe("a project file", () => {
   it("keeps what is told of a take", () => {
     const result = { id: "0123456789abcdef", seed: 4, seconds: 2, frames: 40, people: 2 };
     const happened = [{ sentence: "walks 2.0 m forward" }, null];
-    const take = takeOf({ ...result, happened, remarks: ["3 steps asked; 4 steps drawn"] }, "drawn");
+    const notes = [{ text: "yodels", line: "nothing like 'yodels'", instead: ["sings"] }];
+    const measures = { overlaps: [{ begin: 1, end: 1.5, depth: 0.06 }] };
+    const remarks = ["3 steps asked; 4 steps drawn", notes[0]!.line];
+    const take = takeOf({ ...result, happened, remarks, notes, measures }, "drawn");
+    expect([take.notes, take.overlaps]).toEqual([notes, measures.overlaps]);
     expect(take.told).toEqual(["Person 1 walks 2.0 m forward", "3 steps asked; 4 steps drawn"]);
     const project = { ...exampleProject(), takes: [take] };
     expect(read(written(project, { id: "film", revision: 1 })).takes).toEqual([take]);

@@ -70,4 +70,42 @@ describe("history", () => {
     history.change("drag", add(0), { merge: "d" });
     expect(listener.mock.calls.map(([, change]) => (change as { draft: boolean }).draft)).toEqual([true, false]);
   });
+
+  it("has every state with what led to it, and goes to any of them", () => {
+    const history = new History(0);
+    for (const [label, n] of [
+      ["one", 1],
+      ["ten", 10],
+      ["hundred", 100],
+    ] as const)
+      history.change(label, add(n));
+    history.undo();
+    const { all, now } = history.states;
+    expect(all.map(({ label, value }) => [label, value])).toEqual([
+      ["the beginning", 0],
+      ["one", 1],
+      ["ten", 11],
+      ["hundred", 111],
+    ]);
+    expect(now).toBe(2);
+    history.go(0);
+    expect(history.value).toBe(0);
+    history.go(3);
+    expect([history.value, history.redo()]).toEqual([111, false]);
+    history.go(3);
+    expect(history.undoLabel).toBe("hundred");
+  });
+
+  it("begins with what was kept of it, and nobody did anything then", () => {
+    const old = new History(0);
+    old.change("one", add(1));
+    old.change("ten", add(10));
+    old.undo();
+    const again = new History(old.value, old.kept);
+    expect([again.undoLabel, again.redoLabel]).toEqual(["one", "ten"]);
+    const labels: string[] = [];
+    again.subscribe((_, change) => labels.push(change.label));
+    again.begin(5, { past: [], future: [] });
+    expect([again.value, again.undo(), labels]).toEqual([5, false, [""]]);
+  });
 });

@@ -112,7 +112,7 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
     const far = off(flat(placesOf(body)), wanted(`${name}.places`));
     const turned = apart(body, wanted(`${name}.turns`));
     expect(unlike, `${name}: features, standard deviations`).toBeLessThan(1e-2);
-    expect(sketch, `${name}: metres as predicted`).toBeLessThan(1e-3);
+    expect(sketch, `${name}: metres as predicted`).toBeLessThan(5e-3);
     expect(far, `${name}: metres`).toBeLessThan(1e-3);
     expect(turned, `${name}: degrees`).toBeLessThan(0.1);
   };
@@ -148,7 +148,7 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
     const segments = said.chains[0]!.map(([text, seconds]) => ({ text, seconds }));
     const way = prior.way(segments, said.path);
     const [features] = await prior.features(literal(segments), 4, 1, undefined, way);
-    expect(off(sketched(features!, startOf(way)), wanted("path of a chain.seen")), "metres").toBeLessThan(1e-3);
+    expect(off(sketched(features!, startOf(way)), wanted("path of a chain.seen")), "metres").toBeLessThan(5e-3);
   }, 600_000);
 
   test("a chain is the same motion", async () => {

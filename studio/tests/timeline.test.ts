@@ -4,13 +4,14 @@ import {
   addSegment,
   between,
   changeSegment,
-  duplicateSegment,
   freeze,
   freezeRest,
+  layOver,
   longestTransition,
   moveSeam,
-  moveSegment,
-  removeSegment,
+  moveSegments,
+  pasteSegments,
+  removeSegments,
   resizeSegment,
   setTransition,
   splitSegment,
@@ -58,25 +59,53 @@ describe("blocks", () => {
     expect(splitSegment(whole, 2.1)).toBe(whole);
   });
 
-  it("are moved, doubled and removed, but the last one stays", () => {
-    expect(ids(moveSegment(project(1, 2, 3), "s0", 2))).toEqual(["s1", "s2", "s0"]);
-    expect(lengths(duplicateSegment(project(1, 2), "s0"))).toEqual([1, 1, 2]);
-    const one = removeSegment(project(1, 2), "s0");
-    expect(ids(one)).toEqual(["s1"]);
-    expect(removeSegment(one, "s1")).toBe(one);
+  it("are moved, pasted and removed; where none is left, an empty one is there", () => {
+    expect(ids(moveSegments(project(1, 2, 3), ["s0"], 2))).toEqual(["s1", "s2", "s0"]);
+    expect(ids(moveSegments(project(1, 2, 3, 4), ["s3", "s1"], 0))).toEqual(["s1", "s3", "s0", "s2"]);
+    const old = project(1, 2);
+    const [more, fresh] = pasteSegments(old, old.segments, 1);
+    expect(lengths(more)).toEqual([1, 1, 2, 2]);
+    expect(ids(more)).toEqual(["s0", ...fresh, "s1"]);
+    expect(ids(removeSegments(more, fresh))).toEqual(["s0", "s1"]);
+    const none = removeSegments(old, ["s0", "s1"]);
+    expect(none.segments.map(({ text }) => text)).toEqual([""]);
+    expect(removeSegments(none, ids(none))).toBe(none);
   });
 
   it("give the same project back where nothing changes, so that no step of undo is made", () => {
     const old = project(1, 2);
     expect(changeSegment(old, "s0", { text: "text 0" })).toBe(old);
-    expect(moveSegment(old, "s0", 0)).toBe(old);
+    expect(moveSegments(old, ["s0"], 0)).toBe(old);
     expect(resizeSegment(old, "s0", 1)).toBe(old);
   });
 
   it("land where their pointer is among the others", () => {
-    expect(landing(project(2, 2, 2), "s0", 5.5)).toBe(2);
-    expect(landing(project(2, 2, 2), "s0", 3.5)).toBe(1);
-    expect(landing(project(2, 2, 2), "s2", 0.5)).toBe(0);
+    expect(landing(project(2, 2, 2), ["s0"], 5.5)).toBe(2);
+    expect(landing(project(2, 2, 2), ["s0"], 3.5)).toBe(1);
+    expect(landing(project(2, 2, 2), ["s2"], 0.5)).toBe(0);
+  });
+
+  it("lie over others, which stay when they are and are cut", () => {
+    const over = layOver(project(2, 1, 4, 2), ["s1"], 5);
+    expect(over.segments.map(({ text, seconds }) => [text, seconds])).toEqual([
+      ["text 0", 3],
+      ["text 2", 2],
+      ["text 1", 1],
+      ["text 2", 1],
+      ["text 3", 2],
+    ]);
+    expect(new Set(ids(over)).size).toBe(5);
+    expect(length(over)).toBe(9);
+  });
+
+  it("lie over the beginning and behind the end, and leave nothing shorter than a fifth of a second", () => {
+    const first = layOver(project(2, 1), ["s1"], 0);
+    expect([ids(first)[0], ...lengths(first)]).toEqual(["s1", 1, 2]);
+    expect(lengths(layOver(project(2, 3), ["s0"], 4))).toEqual([4, 2]);
+    expect(lengths(layOver(project(2, 1, 4), ["s1"], 3.1))).toEqual([3, 1, 3]);
+    const old = project(30, 40, 30);
+    expect(layOver(project(2), ["s0"], 1).segments).toHaveLength(1);
+    expect(layOver(old, ["s1"], 100)).toBe(old);
   });
 });
 

@@ -1,31 +1,38 @@
-/** Everything that can be done, with its words and its key. `?` lists it. */
+/** Everything that can be done, with its words and its keys: what buttons, menus, keys, the palette and `?` share. */
 
-import { SUFFIX } from "../project/file";
 import { removePoint, removePose, removeTarget } from "../project/asks";
+import { addMarker, nextStop, removeMarker } from "../project/markers";
 import { FPS, begins, clamp, round, toFrame } from "../project/model";
 import {
   addSegment,
-  duplicateSegment,
-  moveSegment,
-  removeSegment,
+  moveSegments,
+  pasteSegments,
+  removeSegments,
   resizeSegment,
   setPeople,
   splitSegment,
 } from "../project/timeline";
 import type { Stage } from "../stage/stage";
 import { type App, duration } from "./app";
+import { type Clipboard, copied, kept } from "./clipboard";
 import type { Deeds } from "./deeds";
 import type { Drawer } from "./drawing";
 import type { Files } from "./files";
 import type { Live } from "./live";
-import { NOTHING, type Session, type Tool } from "./session";
+import { exports, projects, windows } from "./projectActions";
+import type { Projects } from "./projects";
+import { NOTHING, type Session, type Tool, blocksChosen, chosenBlocks } from "./session";
 
 export interface Action {
-  readonly group: "Play" | "Blocks" | "On the stage" | "Takes" | "Project";
+  readonly group: "Play" | "Blocks" | "Timeline" | "On the stage" | "Takes" | "Export" | "Project";
   readonly label: string;
   /** As `keyOf` writes them. */
   readonly keys: readonly string[];
   readonly run: () => void;
+  /** More about it, for menus. */
+  readonly note?: string;
+  /** Whether it can be done at the moment, where that is not always so. */
+  readonly isThere?: () => boolean;
 }
 
 export type Actions = Readonly<Record<string, Action>>;
@@ -35,16 +42,28 @@ export interface Parts {
   readonly drawer: Drawer;
   readonly deeds: Deeds;
   readonly files: Files;
+  readonly projects: Projects;
   readonly stage: Stage;
   readonly toggleTheme: () => void;
   readonly editWords: (id: string) => void;
   readonly live: Live;
   readonly choose: () => void;
   readonly zoom: (factor: number) => void;
+  /** Show all of the timeline. */
+  readonly fit: () => void;
 }
 
 export function actions(parts: Parts): Actions {
-  return { ...play(parts), ...blocks(parts), ...stage(parts), ...takes(parts), ...project(parts) };
+  return {
+    ...play(parts),
+    ...blocks(parts),
+    ...timeline(parts),
+    ...stage(parts),
+    ...takes(parts),
+    ...exports(parts),
+    ...projects(parts),
+    ...windows(parts),
+  };
 }
 
 function play({ app }: Parts): Actions {
@@ -76,37 +95,51 @@ function play({ app }: Parts): Actions {
   };
 }
 
-function blocks({ app, editWords, zoom }: Parts): Actions {
+function blocks({ app, editWords }: Parts): Actions {
   const { project, session } = app;
   const group = "Blocks" as const;
-  const selected = () => {
-    const { selection, time } = session.value;
+  const under = () => {
+    const at = begins(project.value.segments);
     const { segments } = project.value;
-    if (selection.kind === "segment") return selection.id;
-    const at = begins(segments);
-    return (segments.find((_, index) => time < at[index + 1]!) ?? segments.at(-1)!).id;
+    return (segments.find((_, index) => session.value.time < at[index + 1]!) ?? segments.at(-1)!).id;
   };
-  const step = (by: number) => {
+  const chosen = () => {
+    const ids = chosenBlocks(session.value.selection);
+    return ids.length ? ids : [under()];
+  };
+  const indexOf = (id: string) => project.value.segments.findIndex((one) => one.id === id);
+  const step = (by: number, more = false) => {
     const { segments } = project.value;
-    const index = segments.findIndex((one) => one.id === selected());
-    const isOn = session.value.selection.kind === "segment";
-    const next = segments[clamp(index + (isOn ? by : 0), 0, segments.length - 1)]!;
-    session.update({ selection: { kind: "segment", id: next.id } });
+    const ids = chosenBlocks(session.value.selection);
+    const from = indexOf(ids[0] ?? under());
+    const next = segments[clamp(from + (ids.length ? by : 0), 0, segments.length - 1)]!;
+    session.update({ selection: blocksChosen([next.id, ...(more ? ids.filter((id) => id !== next.id) : [])]) });
   };
   const stretch = (by: number) => {
-    const id = selected();
-    const index = project.value.segments.findIndex((one) => one.id === id);
-    const end = begins(project.value.segments)[index + 1]!;
-    project.change("change a length", (old) => resizeSegment(old, id, end + by), {
-      merge: `length:${id}`,
-      typed: true,
-    });
+    const ids = chosen();
+    const change = (old: typeof project.value) =>
+      ids.reduce((now, id) => {
+        const index = now.segments.findIndex((one) => one.id === id);
+        return resizeSegment(now, id, begins(now.segments)[index + 1]! + by);
+      }, old);
+    project.change("change a length", change, { merge: `length:${ids.join()}`, typed: true });
   };
   const reorder = (by: number) => {
-    const id = selected();
-    const index = project.value.segments.findIndex((one) => one.id === id);
-    project.change("move a block", (old) => moveSegment(old, id, index + by));
+    const ids = chosen();
+    const first = Math.min(...ids.map(indexOf));
+    project.change("move a block", (old) => moveSegments(old, ids, first + by));
   };
+  const paste = (found: Clipboard, to: number, label: string) => {
+    let fresh: string[] = [];
+    project.change(label, (old) => {
+      const [next, ids] = pasteSegments(old, found, to);
+      fresh = ids;
+      return next;
+    });
+    session.update({ selection: blocksChosen(fresh) });
+  };
+  const copy = () => copied(project.value.segments.filter((one) => chosen().includes(one.id)));
+  const behind = () => Math.max(...chosen().map(indexOf)) + 1;
   return {
     add: {
       group,
@@ -117,9 +150,17 @@ function blocks({ app, editWords, zoom }: Parts): Actions {
         editWords(project.value.segments.at(-1)!.id);
       },
     },
-    write: { group, label: "Write in the block", keys: ["Enter"], run: () => editWords(selected()) },
+    write: { group, label: "Write in the block", keys: ["Enter"], run: () => editWords(chosen()[0]!) },
     previous: { group, label: "Block before", keys: ["ArrowUp"], run: () => step(-1) },
     next: { group, label: "Block behind", keys: ["ArrowDown"], run: () => step(1) },
+    morePrevious: { group, label: "Select the block before, too", keys: ["Shift+ArrowUp"], run: () => step(-1, true) },
+    moreNext: { group, label: "Select the block behind, too", keys: ["Shift+ArrowDown"], run: () => step(1, true) },
+    all: {
+      group,
+      label: "Select all blocks",
+      keys: ["Ctrl+A"],
+      run: () => session.update({ selection: blocksChosen(project.value.segments.map((one) => one.id)) }),
+    },
     shorter: { group, label: "Shorter by a quarter second", keys: [","], run: () => stretch(-0.25) },
     longer: { group, label: "Longer by a quarter second", keys: ["."], run: () => stretch(0.25) },
     earlier: { group, label: "Move the block to the left", keys: ["Alt+ArrowLeft"], run: () => reorder(-1) },
@@ -134,16 +175,72 @@ function blocks({ app, editWords, zoom }: Parts): Actions {
       group,
       label: "Duplicate the block",
       keys: ["D"],
-      run: () => project.change("duplicate a block", (old) => duplicateSegment(old, selected())),
+      run: () =>
+        paste(
+          project.value.segments.filter((one) => chosen().includes(one.id)),
+          behind(),
+          "duplicate a block",
+        ),
+    },
+    copy: { group, label: "Copy blocks", keys: ["Ctrl+C"], run: copy },
+    cut: {
+      group,
+      label: "Cut blocks",
+      keys: ["Ctrl+X"],
+      run: () => {
+        copy();
+        const ids = chosen();
+        session.update({ selection: NOTHING });
+        project.change("cut blocks", (old) => removeSegments(old, ids));
+      },
+    },
+    paste: {
+      group,
+      label: "Paste blocks behind the selected one",
+      keys: ["Ctrl+V"],
+      isThere: () => kept().length > 0,
+      run: () => {
+        const found = kept();
+        if (found.length) paste(found, behind(), "paste blocks");
+      },
     },
     remove: { group, label: "Delete what is selected", keys: ["Delete", "Backspace"], run: () => removeSelected(app) },
+  };
+}
+
+function timeline({ app, zoom, fit }: Parts): Actions {
+  const { project, session } = app;
+  const group = "Timeline" as const;
+  const stop = (by: 1 | -1) =>
+    session.update({ time: clamp(nextStop(project.value, session.value.time, by), 0, duration(app)), playing: false });
+  return {
+    fit: { group, label: "Show the whole timeline", keys: ["F"], run: fit },
     zoomIn: { group, label: "Zoom in", keys: ["+", "="], run: () => zoom(1.4) },
     zoomOut: { group, label: "Zoom out", keys: ["-"], run: () => zoom(1 / 1.4) },
+    marker: {
+      group,
+      label: "Put a marker at the playhead",
+      keys: ["Shift+M"],
+      run: () => {
+        project.change("put a marker", (old) => addMarker(old, session.value.time));
+        const at = toFrame(session.value.time);
+        const found = project.value.markers.find((one) => Math.abs(one.time - at) < 1e-3);
+        if (found) session.update({ selection: { kind: "marker", id: found.id } });
+      },
+    },
+    stopBefore: { group, label: "To the seam or marker before", keys: ["Ctrl+ArrowLeft"], run: () => stop(-1) },
+    stopBehind: { group, label: "To the seam or marker behind", keys: ["Ctrl+ArrowRight"], run: () => stop(1) },
     snapping: {
       group,
       label: "Snap or not",
       keys: ["M"],
       run: () => session.update({ snapping: !session.value.snapping }),
+    },
+    overwriting: {
+      group,
+      label: "Moved blocks push the others aside, or lie over them",
+      keys: ["Shift+R"],
+      run: () => session.update({ overwriting: !session.value.overwriting }),
     },
   };
 }
@@ -151,7 +248,10 @@ function blocks({ app, editWords, zoom }: Parts): Actions {
 function removeSelected({ project, session }: App): void {
   const { selection, person } = session.value;
   session.update({ selection: NOTHING });
-  if (selection.kind === "segment") project.change("delete a block", (old) => removeSegment(old, selection.id));
+  const ids = chosenBlocks(selection);
+  if (ids.length)
+    project.change(ids.length > 1 ? "delete blocks" : "delete a block", (old) => removeSegments(old, ids));
+  if (selection.kind === "marker") project.change("delete a marker", (old) => removeMarker(old, selection.id));
   if (selection.kind === "target") project.change("delete a target", (old) => removeTarget(old, person, selection.id));
   if (selection.kind === "pose") project.change("delete a pose", (old) => removePose(old, person, selection.id));
   if (selection.kind === "point") project.change("delete a point", (old) => removePoint(old, person, selection.index));
@@ -165,7 +265,7 @@ function stage({ app, deeds, live, stage }: Parts): Actions {
       tool: session.value.tool === name ? "select" : name,
       playing: name === "select" && session.value.playing,
     });
-  const flip = (key: "follow" | "ghosts" | "trails") => () =>
+  const flip = (key: "follow" | "ghosts" | "around" | "trails") => () =>
     session.update({ [key]: !session.value[key] } as Partial<Session>);
   return {
     select: { group, label: "Select and look around", keys: ["V"], run: tool("select") },
@@ -173,10 +273,12 @@ function stage({ app, deeds, live, stage }: Parts): Actions {
     target: { group, label: "Drag joints", keys: ["T"], run: tool("target") },
     pose: { group, label: "Keyframe the pose at hand", keys: ["O"], run: () => deeds.keyframe() },
     live: { group, label: "Live: steer somebody who moves", keys: ["J"], run: () => live.toggle() },
-    follow: { group, label: "Camera follows", keys: ["C"], run: flip("follow") },
+    follow: { group, label: "Follow with the camera", keys: ["C"], run: flip("follow") },
     above: { group, label: "Look from above", keys: ["X"], run: () => stage.fromAbove() },
     ghosts: { group, label: "Ghosts of other takes", keys: ["H"], run: flip("ghosts") },
-    trails: { group, label: "Trails", keys: ["I"], run: flip("trails") },
+    frameAll: { group, label: "Show the whole motion", keys: ["Shift+F"], run: () => stage.frameAll() },
+    around: { group, label: "Ghosts before and behind the playhead", keys: ["Shift+G"], run: flip("around") },
+    trails: { group, label: "Trails of hips, hands and feet", keys: ["I"], run: flip("trails") },
     people: {
       group,
       label: "One person or two",
@@ -203,6 +305,7 @@ function takes({ app, deeds, drawer }: Parts): Actions {
   };
   return {
     draw: { group, label: "Draw again with another seed", keys: ["R"], run: () => drawer.again() },
+    all: { group, label: "Draw all blocks, none kept", keys: ["Shift+R"], run: () => drawer.all() },
     four: {
       group,
       label: "Four takes side by side, or one",
@@ -226,8 +329,8 @@ function takes({ app, deeds, drawer }: Parts): Actions {
       run: () => session.update({ sideBySide: !session.value.sideBySide }),
     },
     another: { group, label: "Keep the next take", keys: ["K"], run: next },
-    freeze: { group, label: "Freeze the marked stretch or the block", keys: ["F"], run: () => void deeds.freeze() },
-    unfreeze: { group, label: "Unfreeze everything", keys: ["Shift+F"], run: () => deeds.unfreeze() },
+    freeze: { group, label: "Freeze the marked stretch or the block", keys: ["Z"], run: () => void deeds.freeze() },
+    unfreeze: { group, label: "Unfreeze everything", keys: ["Shift+Z"], run: () => deeds.unfreeze() },
     predict: { group, label: "What could come next", keys: ["N"], run: () => void deeds.predict() },
     loop: { group, label: "Make it a loop", keys: ["L"], run: () => void deeds.loop() },
     aside: { group, label: "Put the take aside", keys: ["W"], run: () => deeds.keepAside() },
@@ -236,33 +339,12 @@ function takes({ app, deeds, drawer }: Parts): Actions {
 }
 
 function leave({ session }: App, drawer: Drawer): void {
-  const { help, fan, range, drawing } = session.value;
-  if (help) session.update({ help: false });
+  const { welcome, sheet, fan, range, drawing } = session.value;
+  if (welcome) session.update({ welcome: false });
+  else if (sheet) session.update({ sheet: false });
   else if (fan) session.update({ fan: null });
   else if (drawing) drawer.stop();
   else session.update({ tool: "select", selection: NOTHING, range: range && null, error: null });
-}
-
-function project({ app, files, choose, toggleTheme }: Parts): Actions {
-  const { project: history, session } = app;
-  const group = "Project" as const;
-  return {
-    undo: { group, label: "Undo", keys: ["Ctrl+Z"], run: () => void history.undo() },
-    redo: { group, label: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], run: () => void history.redo() },
-    open: { group, label: "Open files", keys: ["Ctrl+O"], run: choose },
-    save: {
-      group,
-      label: `Save the project as a file (${SUFFIX})`,
-      keys: ["Ctrl+S"],
-      run: () => void files.export("project"),
-    },
-    export: { group, label: "Export BVH", keys: ["E"], run: () => void files.export("bvh") },
-    exportGlb: { group, label: "Export GLB", keys: ["Shift+E"], run: () => void files.export("glb") },
-    share: { group, label: "Share as a web page", keys: ["Ctrl+E"], run: () => void files.export("html") },
-    exportYaml: { group, label: "Export the timeline as YAML", keys: ["Alt+E"], run: () => void files.export("yaml") },
-    theme: { group, label: "Dark or light", keys: ["Shift+D"], run: toggleTheme },
-    help: { group, label: "Keys", keys: ["?", "F1"], run: () => session.update({ help: !session.value.help }) },
-  };
 }
 
 /** Arrow keys move what the tool holds: metres over the floor, or up and down. */

@@ -1,6 +1,7 @@
 /** What every part of the page is given: the project with its history, what is shown, and what the server said. */
 
 import type { MotionClip } from "../body/clip";
+import { ProjectError } from "../project/file";
 import type { History } from "../project/history";
 import { type Project, length } from "../project/model";
 import { type Problem, placeOf, withoutKeys } from "../project/places";
@@ -39,10 +40,23 @@ export function seenTakes(app: App): readonly MotionClip[] {
 
 /** An error as a sentence with its place in the project. */
 export function problemOf(app: App, error: unknown): Problem {
+  if (isFault(error)) return { message: faultOf(error), at: null };
   const { message } = error as Error;
   if (!(error instanceof Refused)) return { message, at: null };
   const at = placeOf(app.project.value, message, error.where);
   return { message: withoutKeys(message), at, isFull: error.status === FULL };
+}
+
+/** Whether an error is the program's or the browser's own rather than a sentence that was written for somebody. */
+function isFault(error: unknown): boolean {
+  const isSaid = error instanceof Refused || error instanceof Unreachable || error instanceof ProjectError;
+  return !isSaid && (error as Error | null)?.constructor !== Error;
+}
+
+/** A fault as a sentence. */
+export function faultOf(error: unknown): string {
+  const what = error instanceof Error ? `${error.name}: ${error.message}` : String(error);
+  return `That failed by a fault of this page (${what.slice(0, 160)}); your work is kept, and a reload may help.`;
 }
 
 /** Show what went wrong: nobody answers, there is no room, or a sentence at its place; `what` begins it. */

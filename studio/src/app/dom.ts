@@ -63,7 +63,10 @@ function alike(a: Node, b: Node): boolean {
   return !(a instanceof Element) || a.getAttribute("data-key") === (b as Element).getAttribute("data-key");
 }
 
+/** What says by `data-same` that it is the same is left as it is: of hundreds of blocks one may have changed. */
 function take(there: Element, next: Element): void {
+  const same = next.getAttribute("data-same");
+  if (same !== null && same === there.getAttribute("data-same")) return;
   for (const { name } of [...there.attributes]) {
     // Whether a menu is open is up to who opened it.
     const isOpen = name === "open" && there instanceof HTMLDetailsElement;

@@ -2,7 +2,7 @@
 
 import { keepWay, needsWay } from "../project/asks";
 import { overlaid } from "../body/clip";
-import { type Project, keptTake } from "../project/model";
+import { CHANGED, FPS, type Project, keptTake, length } from "../project/model";
 import { type Job, type Plan, isDrawn, plan, planKey } from "../project/plan";
 import { type Result, motion, takeOf } from "../server/api";
 import type { JobRequest } from "../server/types";
@@ -17,7 +17,7 @@ import { type App, denoised, fail, shownClip } from "./app";
 const SHOWN_EVERY = 6;
 const PREVIEW = 0.25;
 /** Milliseconds that somebody pauses in typing before their words are drawn. */
-const TYPING = 550;
+const TYPING = 250;
 
 /** Milliseconds between two states of the progress bar: each is a new picture of the page. */
 const TELLING = 150;
@@ -27,6 +27,11 @@ const SLOW = 45;
 
 /** When the last draws were asked and seen, for scripts that measure (`performance` marks). */
 export const MARKS = { asked: "draw-asked", preview: "draw-preview", full: "draw-full" } as const;
+
+/** The motion whose blocks stay where they ask for the same; null: none, or there are to be several. */
+function keptFrom(project: Project): string | null {
+  return project.count === 1 && !project.base ? (keptTake(project)?.motion ?? null) : null;
+}
 
 export class Drawer {
   private running: AbortController | null = null;
@@ -68,6 +73,11 @@ export class Drawer {
     const clip = shownClip(this.app);
     const who = needsWay(this.app.project.value);
     if (clip && who >= 0 && who < clip.people.length) this.app.project.amend((old) => keepWay(old, who, clip));
+  }
+
+  /** Draw all blocks, also those that would be kept: what the timeline's file makes. */
+  all(): void {
+    this.app.project.change("draw all blocks", (old) => ({ ...old, takes: [], kept: 0, drawn: "" }));
   }
 
   /** Draw with another seed. */
@@ -132,7 +142,7 @@ export class Drawer {
     if (value.base) this.app.denoising.value = [];
     this.app.session.update({ error: null, fan: null, pending: false, drawing: { done: 0, of: 1 } });
     try {
-      const results = await this.chain(jobs, running);
+      const results = await this.chain(jobs, running, keptFrom(value));
       await this.keep(value, this.key, results, running.signal);
       performance.mark(MARKS.full);
     } catch (error) {
@@ -142,18 +152,27 @@ export class Drawer {
     }
   }
 
-  /** Jobs one after the other; an edit without a motion goes on from the one before. */
-  private async chain(jobs: readonly Job[], running: AbortController): Promise<readonly Result[]> {
+  /**
+   * Jobs one after the other; an edit without a motion goes on from the one before. `old`: the motion of which a timeline
+   * keeps what did not change, as long as the server has it.
+   */
+  private async chain(jobs: readonly Job[], running: AbortController, old: string | null): Promise<readonly Result[]> {
     let results: readonly Result[] = [];
     for (const job of jobs) {
       const request = job.task === "edit" ? { ...job, motion: job.motion ?? results[0]!.id } : job;
-      results = await this.run(request, running, job.count);
+      if (job.task !== "compose" || !old) results = await this.run(request, running, job.count);
+      else
+        results = await this.run({ ...job, kept_from: old }, running, job.count).catch((error: unknown) => {
+          if (!(error instanceof Refused) || error.status !== 404) throw error;
+          return this.run(job, running, job.count);
+        });
     }
     return results;
   }
 
   private async keep(project: Project, key: string, results: readonly Result[], signal: AbortSignal): Promise<void> {
-    const takes = results.map((result) => takeOf(result, project.base ? "redrawn" : "drawn"));
+    const how = (result: Result) => (project.base ? "redrawn" : result.measures?.redrawn ? CHANGED : "drawn");
+    const takes = results.map((result) => takeOf(result, how(result)));
     const clips = await Promise.all(takes.map((take) => motion(take.motion)));
     signal.throwIfAborted();
     this.app.denoising.value = [];
@@ -182,15 +201,17 @@ export class Drawer {
     });
   }
 
-  /** Put what is predicted for the motion on the stage; an edit's part lies in the motion that it changes. */
+  /** Put what is predicted for the motion on the stage; a part lies in the motion that it changes. */
   private show(job: JobRequest, { level, of, row, clip, begin }: Level, takes: number): void {
     if (this.previewed.has(row) && this.isSlow) return;
     const { denoising } = this.app;
     const shown = denoising.value.slice(0, takes);
     if (row > shown.length) return;
-    const edited = job.task === "edit" ? job : null;
-    const whole = edited ? (shown[row] ?? denoised(this.app) ?? shownClip(this.app)) : null;
-    shown[row] = whole ? overlaid(whole, clip, edited?.person ?? 0, begin) : clip;
+    const isPart =
+      job.task === "edit" ||
+      (job.task === "compose" && job.kept_from && clip.seconds < length(this.app.project.value) - 0.5 / FPS);
+    const whole = isPart ? (shown[row] ?? denoised(this.app) ?? shownClip(this.app)) : null;
+    shown[row] = whole ? overlaid(whole, clip, job.task === "edit" ? (job.person ?? 0) : 0, begin) : clip;
     denoising.value = shown;
     if (this.previewed.has(row) || level / of < PREVIEW) return;
     this.previewed.add(row);

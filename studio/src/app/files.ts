@@ -2,7 +2,7 @@
 
 import { SUFFIX, checked, read, written } from "../project/file";
 import { asked, timelineOf } from "../project/goals";
-import { type Project, type Stamp, keptTake } from "../project/model";
+import { CHANGED, type Project, type Stamp, keptTake } from "../project/model";
 import { opened } from "../project/opened";
 import {
   type Format,
@@ -13,13 +13,20 @@ import {
   uploadCharacter,
   uploadMotion,
 } from "../server/api";
-import { type App, fail } from "./app";
+import { Refused } from "../server/http";
+import { type App, fail, problemOf } from "./app";
 import type { Deeds } from "./deeds";
+import type { Projects } from "./projects";
+import type { Unnamed } from "./session";
 
 const MOTIONS = [".bvh", ".amc", ".npz", ".glb", ".asf"];
 /** Bytes of a page from which on its size is said. */
 const LARGE = 1_500_000;
 const GLB_MAGIC = 0x46546c67;
+
+/** Said in the file of a timeline whose blocks were changed one at a time. */
+const ANEW =
+  "# Blocks were changed one at a time, and the others kept; the command draws all of them, as 'Draw all blocks' does.\n";
 
 export class Files {
   /** The skeleton that came last, for AMC files. */
@@ -28,6 +35,7 @@ export class Files {
   constructor(
     private readonly app: App,
     private readonly deeds: Deeds,
+    private readonly projects: Projects,
   ) {}
 
   /** Whatever was dropped: motions, characters, timelines, projects. */
@@ -67,12 +75,14 @@ export class Files {
       throw new Error("frozen stretches are not in a timeline file; unfreeze them, or export the motion itself.");
     if (project.reactTo) throw new Error("an answer to a clip is not in a timeline file; export the motion itself.");
     const yaml = await timelineYaml(timelineOf(project, keptTake(project)?.seed ?? project.seed));
-    download(new Blob([`# motionloom ${command(project, `${name}.yaml`)}\n`, yaml]), `${name}.yaml`);
+    const isChanged = keptTake(project)?.how === CHANGED;
+    const head = `# motionloom ${command(project, `${name}.yaml`)}\n${isChanged ? ANEW : ""}`;
+    download(new Blob([head, yaml]), `${name}.yaml`);
   }
 
   private async openOne(file: File): Promise<void> {
     const name = file.name.toLowerCase();
-    if (name.endsWith(".json")) return this.replace(read(await file.text()), file.name);
+    if (name.endsWith(".json")) return this.projects.add(read(await file.text()));
     if (name.endsWith(".yaml") || name.endsWith(".yml")) return this.openTimeline(file);
     if (name.endsWith(".vrm")) return this.character(file);
     if (isAsf(file)) {
@@ -89,20 +99,37 @@ export class Files {
     if (hasMotion) this.deeds.addClip(await uploadMotion(file, name.endsWith(".amc") ? this.asf : null), file.name);
   }
 
+  /** Use the refused character with the joints that somebody named; gives the sentence of what is wrong with them. */
+  async nameJoints(joints: Record<string, string>): Promise<string | null> {
+    const file = this.app.session.value.unnamed?.file;
+    try {
+      if (file) await this.take(file, joints);
+      this.app.session.update({ dialog: null, unnamed: null });
+      return null;
+    } catch (error) {
+      return problemOf(this.app, error).message;
+    }
+  }
+
   private async character(file: File): Promise<void> {
-    const { id } = await uploadCharacter(file);
+    try {
+      await this.take(file);
+    } catch (error) {
+      const { joints, guesses } = (error instanceof Refused ? error.about : {}) as Partial<Unnamed>;
+      if (!joints || !guesses) throw error;
+      this.app.session.update({ unnamed: { file, joints, guesses }, dialog: "joints" });
+    }
+  }
+
+  private async take(file: File, joints: Record<string, string> = {}): Promise<void> {
+    const { id } = await uploadCharacter(file, joints);
     this.app.project.change(`use ${file.name}`, (old) => ({ ...old, character: { id, name: file.name } }));
   }
 
   private async openTimeline(file: File): Promise<void> {
     const found = (await timelineJson(file)) as Record<string, unknown>;
     const second = /^#.* --person 2\b/.test(await file.slice(0, 500).text());
-    this.replace(checked(opened(found, file.name.replace(/\.ya?ml$/i, ""), second ? 1 : 0)), file.name);
-  }
-
-  private replace(project: Project, name: string): void {
-    this.app.session.update({ time: 0, selection: { kind: "none" }, fan: null, range: null });
-    this.app.project.change(`open ${name}`, () => project);
+    await this.projects.add(checked(opened(found, file.name.replace(/\.ya?ml$/i, ""), second ? 1 : 0)));
   }
 
   private async said(what: string, deed: () => Promise<void>): Promise<void> {
@@ -145,7 +172,12 @@ async function glbContents(file: File): Promise<{ hasMotion: boolean; hasBody: b
   if (head.byteLength < 20 || head.getUint32(0, true) !== GLB_MAGIC)
     throw new Error("it is no GLB file; its first bytes are not 'glTF'.");
   const text = await file.slice(20, 20 + head.getUint32(12, true)).text();
-  const found = JSON.parse(text) as { animations?: unknown[]; skins?: unknown[]; meshes?: unknown[] };
+  let found: { animations?: unknown[]; skins?: unknown[]; meshes?: unknown[] };
+  try {
+    found = JSON.parse(text) as typeof found;
+  } catch {
+    throw new Error("it is no GLB file: its description cannot be read; export it again.");
+  }
   return {
     hasMotion: Boolean(found.animations?.length),
     hasBody: Boolean(found.skins?.length && found.meshes?.length),

@@ -9,11 +9,13 @@
 import { ProjectError, checked, filed, stampOf } from "../project/file";
 import { type Project, type Stamp, exampleProject, newId } from "../project/model";
 import type { Problem } from "../project/places";
-import { isUp, putAside, saveProject, savedProject, savedStamp } from "../server/api";
+import type { Kept as KeptHistory } from "../project/history";
+import { isUp, openProject, putAside, saveProject, savedProject, savedStamp } from "../server/api";
 import { CLIENT, Refused, Unreachable } from "../server/http";
 import { type App, fail } from "./app";
 import { saveFile } from "./files";
-import type { Conflict } from "./session";
+import { EMPTY, remembered } from "./memory";
+import { type Conflict, NOTHING } from "./session";
 
 const KEY = "motionloom-studio";
 const QUIET = 500;
@@ -215,6 +217,47 @@ export class Saver {
       if (this.again) this.soon();
       this.again = false;
     }
+  }
+
+  /** Everything that was done here is on the server; raises an error with a sentence where it is not. */
+  async flush(): Promise<void> {
+    if (this.app.session.value.conflict) throw new Error("your changes are not saved; answer the question first.");
+    while (this.sent) await new Promise((resume) => setTimeout(resume, 50));
+    if (this.app.session.value.saved !== "saved") await this.save();
+    if (this.app.session.value.saved !== "saved") throw new Error("this project cannot be saved, so it stays open.");
+  }
+
+  /** Begin another project in the folder; the one that was open stays there. */
+  async begin(project: Project): Promise<void> {
+    await this.flush();
+    const stamp = await saveProject(project, { id: newId(), revision: 0 }, this.app.session.value.stamp);
+    this.show(project, stamp, EMPTY);
+  }
+
+  /** Open another project of the folder, with its own history. */
+  async open(id: string): Promise<void> {
+    await this.flush();
+    await openProject(id);
+    const found = await savedProject();
+    const [project, stamp] = [checked(found), stampOf(found)!];
+    this.show(project, stamp, await remembered(stamp.id, project));
+  }
+
+  private show(project: Project, stamp: Stamp, kept: KeptHistory<Project>): void {
+    this.edited = false;
+    const cleared = {
+      time: 0,
+      selection: NOTHING,
+      fan: null,
+      range: null,
+      clips: [],
+      error: null,
+      told: null,
+    } as const;
+    this.app.session.update({ stamp, conflict: null, saved: "saved", sideBySide: false, person: 0, ...cleared });
+    this.app.project.begin(project, kept);
+    this.keepHere(false);
+    this.others.postMessage(stamp.revision);
   }
 
   /** What somebody chose where the server has something else: a file of what is here, what is there, or what is here. */

@@ -1,7 +1,7 @@
 /** What the page shows at the moment: nothing of it is undone, and nothing of it is in the project file. */
 
 import type { MotionClip } from "../body/clip";
-import { type Project, type Range, type Stamp, newId } from "../project/model";
+import { type Project, type Range, type Stamp, type Vec3, newId } from "../project/model";
 import type { Problem } from "../project/places";
 import { Signal } from "./signal";
 
@@ -9,10 +9,32 @@ export type Tool = "select" | "path" | "target";
 
 export type Selection =
   | { readonly kind: "none" }
-  | { readonly kind: "segment"; readonly id: string }
+  /** `more`: other blocks that are selected with it. */
+  | { readonly kind: "segment"; readonly id: string; readonly more?: readonly string[] }
+  | { readonly kind: "marker"; readonly id: string }
   | { readonly kind: "target"; readonly id: string }
   | { readonly kind: "pose"; readonly id: string }
   | { readonly kind: "point"; readonly index: number };
+
+/** The ids of all blocks that are selected. */
+export function chosenBlocks(selection: Selection): readonly string[] {
+  return selection.kind === "segment" ? [selection.id, ...(selection.more ?? [])] : [];
+}
+
+/** These blocks as what is selected. */
+export function blocksChosen([id, ...more]: readonly string[]): Selection {
+  return id === undefined ? NOTHING : { kind: "segment", id, ...(more.length ? { more } : {}) };
+}
+
+/** A character that was refused, since nobody can tell its joints: what is to be named, and what is guessed. */
+export interface Unnamed {
+  readonly file: File;
+  readonly joints: readonly { readonly name: string; readonly parent: number; readonly place: Vec3 }[];
+  readonly guesses: Readonly<Record<string, string>>;
+}
+
+/** What lies over the page and waits for an answer. */
+export type Dialog = "help" | "palette" | "history" | "projects" | "name" | "joints";
 
 /** How far a draw is; null where none is under way. */
 export interface Drawing {
@@ -41,10 +63,19 @@ export interface Session {
   readonly range: Range | null;
   readonly follow: boolean;
   readonly ghosts: boolean;
+  /** Whether ghosts show the motion a little before and behind the playhead. */
+  readonly around: boolean;
   readonly trails: boolean;
   readonly sideBySide: boolean;
   readonly snapping: boolean;
-  readonly help: boolean;
+  /** Whether a block that is moved lies over others, which stay when they are, or pushes them aside. */
+  readonly overwriting: boolean;
+  readonly dialog: Dialog | null;
+  readonly unnamed: Unnamed | null;
+  /** Whether the first question is asked: what the person should do. */
+  readonly welcome: boolean;
+  /** Whether the panel is shown where the window has no room for it beside the stage. */
+  readonly sheet: boolean;
   readonly drawing: Drawing | null;
   /** A draw begins soon. */
   readonly pending: boolean;
@@ -84,10 +115,15 @@ export function newSession(): Signal<Session> {
     range: null,
     follow: true,
     ghosts: true,
+    around: false,
     trails: false,
     sideBySide: false,
     snapping: true,
-    help: false,
+    overwriting: false,
+    dialog: null,
+    unnamed: null,
+    welcome: false,
+    sheet: false,
     drawing: null,
     pending: false,
     fan: null,

@@ -28,7 +28,7 @@ export function askedPanels(app: App, project: Project, person: Person, who: num
       h(
         "p",
         { class: "quiet" },
-        "While stretches are frozen, only words are drawn; path and targets count again when everything is unfrozen (Shift F).",
+        "While stretches are frozen, only words are drawn; path and targets count again when everything is unfrozen (Shift Z).",
       ),
     );
   return panels;

@@ -3,20 +3,23 @@
 import type { Actions } from "../app/actions";
 import { type App, duration } from "../app/app";
 import { h, morph } from "../app/dom";
-import type { Files } from "../app/files";
+import { EXPORT_KEYS, exportName } from "../app/projectActions";
+import { chosenBlocks } from "../app/session";
 import { begins } from "../project/model";
-import { exportMenu, menuHabits } from "./menu";
+import { menu, menuHabits } from "./menu";
 import { iconButton, textButton } from "./parts";
 
-export function topBar(app: App, actions: Actions, files: Files, root: HTMLElement): void {
+const PROJECT_KEYS = ["new", "open", "recent", "saveAs", "save", "history"];
+
+export function topBar(app: App, actions: Actions, root: HTMLElement): void {
   const render = () => {
     const { value, undoLabel, redoLabel } = app.project;
-    const { connected, saved, drawing, conflict, error } = app.session.value;
+    const { connected, saved, drawing, conflict, error, sheet } = app.session.value;
     const words = { saved: "saved", saving: "saving", here: "kept in this browser" };
     const wrong = !connected ? "server away" : conflict ? "not saved" : error?.isFull ? "the disk is full" : null;
     const state = wrong ?? (drawing ? "drawing" : words[saved]);
     morph(root, [
-      h("strong", { class: "brand" }, "motionloom"),
+      h("h1", { class: "brand" }, "motionloom"),
       h("input", {
         class: "name",
         value: value.name,
@@ -29,6 +32,7 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
             typed: true,
           }),
       }),
+      menu(actions, PROJECT_KEYS, { title: "Project" }),
       iconButton(actions.undo!, "undo", {
         disabled: undoLabel === null,
         title: undoLabel === null ? "Undo" : `Undo: ${undoLabel}`,
@@ -46,16 +50,20 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
         "aria-label": "How far the draw is",
       }),
       iconButton(actions.draw!, "draw"),
-      iconButton(actions.four!, "grid", { pressed: value.count === 4 }),
-      exportMenu(files, value.character !== null),
-      iconButton(actions.theme!, "theme"),
-      iconButton(actions.help!, "help"),
+      iconButton(actions.four!, "grid", { pressed: value.count === 4, fold: true }),
+      menu(actions, EXPORT_KEYS, { title: "Export", strong: true, name: exportName }),
+      iconButton(actions.palette!, "search"),
+      iconButton(actions.panel!, "panel", { pressed: sheet, key: "panel" }),
+      iconButton(actions.theme!, "theme", { fold: true }),
+      iconButton(actions.help!, "help", { fold: true }),
     ]);
   };
   menuHabits(root);
   app.project.subscribe(render);
   app.session.subscribe((now, before) => {
-    if ((["connected", "saved", "drawing", "conflict", "error"] as const).some((key) => now[key] !== before[key]))
+    if (
+      (["connected", "saved", "drawing", "conflict", "error", "sheet"] as const).some((key) => now[key] !== before[key])
+    )
       render();
   });
   render();
@@ -66,11 +74,11 @@ export function stageBar(app: App, actions: Actions, left: HTMLElement, right: H
     const { tool, follow, ghosts, trails, person } = app.session.value;
     const two = app.project.value.people.length > 1;
     morph(left, [
-      iconButton(actions.select!, "select", { pressed: tool === "select" }),
-      iconButton(actions.path!, "path", { pressed: tool === "path" }),
-      iconButton(actions.target!, "target", { pressed: tool === "target" }),
-      iconButton(actions.pose!, "pose"),
-      iconButton(actions.live!, "live", { pressed: app.live.value !== null }),
+      iconButton(actions.select!, "select", { pressed: tool === "select", name: "Select" }),
+      iconButton(actions.path!, "path", { pressed: tool === "path", name: "Path" }),
+      iconButton(actions.target!, "target", { pressed: tool === "target", name: "Joints" }),
+      iconButton(actions.pose!, "pose", { name: "Pose" }),
+      iconButton(actions.live!, "live", { pressed: app.live.value !== null, name: "Live" }),
       ...(two
         ? [
             h(
@@ -87,10 +95,10 @@ export function stageBar(app: App, actions: Actions, left: HTMLElement, right: H
         : []),
     ]);
     morph(right, [
-      iconButton(actions.follow!, "follow", { pressed: follow }),
-      iconButton(actions.above!, "above"),
-      iconButton(actions.ghosts!, "ghosts", { pressed: ghosts }),
-      iconButton(actions.trails!, "trails", { pressed: trails }),
+      iconButton(actions.follow!, "follow", { pressed: follow, name: "Follow" }),
+      iconButton(actions.above!, "above", { name: "Above" }),
+      iconButton(actions.ghosts!, "ghosts", { pressed: ghosts, name: "Ghosts" }),
+      iconButton(actions.trails!, "trails", { pressed: trails, name: "Trails" }),
     ]);
   };
   app.project.subscribe(render);
@@ -106,8 +114,9 @@ export function stageBar(app: App, actions: Actions, left: HTMLElement, right: H
 export function transport(app: App, actions: Actions, root: HTMLElement): void {
   const clock = h("output", { class: "clock", "aria-label": "Time" });
   const render = () => {
-    const { playing, repeat, rate, snapping, selection, range } = app.session.value;
+    const { playing, repeat, rate, snapping, overwriting, selection, range } = app.session.value;
     const { segments, frozen } = app.project.value;
+    const many = chosenBlocks(selection).length;
     const chosen = selection.kind === "segment" ? segments.findIndex((one) => one.id === selection.id) : -1;
     morph(root, [
       iconButton(actions.play!, playing ? "pause" : "play", { title: playing ? "Pause" : "Play" }),
@@ -131,7 +140,7 @@ export function transport(app: App, actions: Actions, root: HTMLElement): void {
       h("span", { class: "rule" }),
       iconButton(actions.freeze!, "freeze", { disabled: !range && chosen < 0 }),
       textButton("Unfreeze", actions.unfreeze!.run, {
-        title: "Unfreeze everything (Shift F)",
+        title: "Unfreeze everything (Shift Z)",
         disabled: !frozen.length,
       }),
       h("span", { class: "grow" }),
@@ -140,11 +149,20 @@ export function transport(app: App, actions: Actions, root: HTMLElement): void {
         { class: "note" },
         range
           ? `${range[0].toFixed(2)} – ${range[1].toFixed(2)} s marked`
-          : chosen >= 0
-            ? `block ${chosen + 1} of ${segments.length}, from ${begins(segments)[chosen]!.toFixed(2)} s`
-            : "",
+          : many > 1
+            ? `${many} blocks selected`
+            : chosen >= 0
+              ? `block ${chosen + 1} of ${segments.length}, from ${begins(segments)[chosen]!.toFixed(2)} s`
+              : "",
       ),
+      textButton(overwriting ? "Overwrite" : "Ripple", actions.overwriting!.run, {
+        title: overwriting
+          ? "A moved block lies over others, which stay when they are (Shift R)"
+          : "A moved block pushes the others aside (Shift R)",
+        pressed: overwriting,
+      }),
       textButton("Snap", actions.snapping!.run, { title: "Times catch on marks (M)", pressed: snapping }),
+      textButton("Fit", actions.fit!.run, { title: "Show the whole timeline (F)" }),
       textButton("−", actions.zoomOut!.run, { title: "Zoom out (-)" }),
       textButton("+", actions.zoomIn!.run, { title: "Zoom in (+)" }),
     ]);
@@ -155,7 +173,7 @@ export function transport(app: App, actions: Actions, root: HTMLElement): void {
   };
   app.project.subscribe(render);
   app.session.subscribe((now, before) => {
-    const keys = ["playing", "repeat", "rate", "snapping", "selection", "range", "clips"] as const;
+    const keys = ["playing", "repeat", "rate", "snapping", "overwriting", "selection", "range", "clips"] as const;
     if (keys.some((key) => now[key] !== before[key])) render();
     else if (now.time !== before.time) tick();
   });

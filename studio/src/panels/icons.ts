@@ -31,6 +31,8 @@ const PATHS = {
   front: "M10 2.7a1.7 1.7 0 1 0 .01 0M6 8h8M10 8v5M10 13l-2.5 5M10 13l2.5 5",
   side: "M9 2.7a1.7 1.7 0 1 0 .01 0M9 7v6l-1 5h2.5M9 8l2 4M11 4.5h2",
   curves: "M3 3v14h14M5 13c3 0 3-7 6-7s2 5 5 5",
+  search: "M8.5 3.5a5 5 0 1 0 .01 0M12.2 12.2L17 17",
+  panel: "M3 4h14v12H3zM12.5 4v12",
   download: "M10 3v9M6.5 8.5L10 12l3.5-3.5M4 16h12",
 } as const;
 

@@ -4,14 +4,27 @@ import type { Actions } from "../app/actions";
 import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h, morph } from "../app/dom";
+import { measuredIn } from "../app/measured";
 import { type Given, type Project, type Segment, begins, length } from "../project/model";
+import { notesOf } from "../project/goals";
 import { changeSegment, longestTransition, resizeSegment, setPeople, setTransition } from "../project/timeline";
 import { clipsSection, fanSection, takesSection } from "./takes";
 import { askedPanels } from "./asked";
+import { markerSection } from "./markers";
 import { numberField, section, textButton, wrong } from "./parts";
 
 export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLElement): void {
+  let measured: readonly string[] = [];
+  /** What happens in the block that is selected: it is shown once the server has measured it. */
+  const measure = async () => {
+    const one = selected(app);
+    const lines = one ? await measuredIn(app, one) : [];
+    if (one !== selected(app) || lines.join() === measured.join()) return;
+    measured = lines;
+    render();
+  };
   const render = () => {
+    void measure();
     const { value } = app.project;
     const { fan, person } = app.session.value;
     const who = Math.min(person, value.people.length - 1);
@@ -23,7 +36,7 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
         ? [fanSection(app, deeds, fan)]
         : [
             ...(isTool ? asked : []),
-            words(app, value, deeds),
+            words(app, value, deeds, measured, actions),
             ...(isTool ? [] : asked),
             takesSection(app, value, actions),
             clipsSection(app, value, deeds),
@@ -38,10 +51,17 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
   render();
 }
 
-function words(app: App, project: Project, deeds: Deeds): HTMLElement {
+function selected(app: App): Segment | null {
   const { selection } = app.session.value;
-  const index = selection.kind === "segment" ? project.segments.findIndex((one) => one.id === selection.id) : -1;
-  const one = project.segments[index];
+  return app.project.value.segments.find((one) => selection.kind === "segment" && one.id === selection.id) ?? null;
+}
+
+function words(app: App, project: Project, deeds: Deeds, measured: readonly string[], actions: Actions): HTMLElement {
+  const { selection } = app.session.value;
+  const one = selected(app);
+  const index = one ? project.segments.indexOf(one) : -1;
+  const marker = selection.kind === "marker" && project.markers.find(({ id }) => id === selection.id);
+  if (marker) return markerSection(app, marker, actions.remove!.run);
   if (!one) {
     return section(
       "Motion",
@@ -71,6 +91,8 @@ function words(app: App, project: Project, deeds: Deeds): HTMLElement {
     area(deeds, one, false),
     two && area(deeds, one, true),
     wrong(app, "segment", one.id),
+    ...remarks(project, one, deeds),
+    ...measured.map((line) => h("p", { class: "quiet told" }, line)),
     kept(one.given, () =>
       app.project.change("drop what the file asked", (old) => changeSegment(old, one.id, { given: null })),
     ),
@@ -106,6 +128,22 @@ function words(app: App, project: Project, deeds: Deeds): HTMLElement {
       }),
     ),
   );
+}
+
+/** What is remarked on the words of a block, with sentences that are known, to take instead. */
+function remarks(project: Project, one: Segment, deeds: Deeds): HTMLElement[] {
+  return notesOf(project, one).map(({ text, line, instead }) => {
+    const second = text.trim() === one.other.trim();
+    const isOfOne = second || text.trim() === one.text.trim();
+    const take = (sentence: string) =>
+      textButton(sentence, () => deeds.write(one.id, sentence, second), { title: "Take these words instead" });
+    return h(
+      "div",
+      { class: "remark", role: "note" },
+      h("p", {}, isOfOne && instead.length ? line.replace(/; nearest: .*/, ". Known are:") : line),
+      isOfOne && instead.length > 0 && h("div", { class: "row wrap" }, ...instead.map(take)),
+    );
+  });
 }
 
 /** What a timeline file asks besides, and a way to be rid of it. */

@@ -1,41 +1,37 @@
-/** The export menu: a `details` element, whose state is the browser's and outlives every new picture of the bar. */
+/** Menus: `details` elements, whose state is the browser's and outlives every new picture of the bar. */
 
+import type { Action, Actions } from "../app/actions";
 import { h } from "../app/dom";
-import type { Files } from "../app/files";
+import { shownKey } from "./parts";
 
-const EXPORTS = [
-  ["bvh", "BVH", "Motion on the 22 joints, or on your character"],
-  ["glb", "GLB", "For Blender, Godot and the web; on your character if there is one"],
-  ["mp4", "MP4", "A film"],
-  ["png", "PNG", "A sheet of poses"],
-  ["npz", "NPZ", "Numbers for Python"],
-  ["html", "Share", "One web page that plays the motion, without a network: send it"],
-  ["share", "Share with your character", "The same, and your character plays it; its file goes along"],
-  ["yaml", "Timeline (YAML)", "What the command line runs to the same motion"],
-  ["project", "Project file", "Everything on this page"],
-] as const;
-
-/** `own`: whether there is a character of one's own. */
-export function exportMenu(files: Files, own: boolean): HTMLElement {
+/** A menu of actions; `name` gives what each is called in it. */
+export function menu(
+  actions: Actions,
+  keys: readonly string[],
+  options: { title: string; strong?: boolean; name?: (key: string, action: Action) => string },
+): HTMLElement {
+  const { title, strong = false, name = (_, action) => action.label } = options;
+  const rows = keys.map((key) => ({ key, action: actions[key]! })).filter(({ action }) => action.isThere?.() ?? true);
   return h(
     "details",
-    { class: "menu", "data-key": "export" },
-    h("summary", { class: "text strong", "aria-label": "Export" }, "Export"),
+    { class: "menu", "data-key": title },
+    h("summary", { class: strong ? "text strong" : "text", "aria-label": title }, title),
     h(
       "div",
       { class: "sheet" },
-      ...EXPORTS.filter(([format]) => own || format !== "share").map(([format, name, title]) =>
+      ...rows.map(({ key, action }) =>
         h(
           "button",
           {
             class: "row",
             onclick: (event: Event) => {
               close((event.currentTarget as Element).closest("details"));
-              void files.export(format);
+              action.run();
             },
           },
-          h("b", {}, name),
-          h("small", {}, title),
+          h("b", {}, name(key, action)),
+          ...action.keys.slice(0, 1).map((one) => h("kbd", {}, shownKey(one))),
+          action.note && h("small", {}, action.note),
         ),
       ),
     ),
@@ -48,7 +44,7 @@ export function menuHabits(root: HTMLElement): void {
   root.addEventListener("keydown", (event) => {
     const menu = open();
     if (!menu?.contains(event.target as Node)) return;
-    const rows = [...menu.querySelectorAll("button")];
+    const rows = [...menu.querySelectorAll<HTMLButtonElement>("button:enabled")];
     const at = rows.indexOf(event.target as HTMLButtonElement);
     const next: Record<string, number> = {
       ArrowDown: (at + 1) % rows.length,

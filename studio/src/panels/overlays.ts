@@ -4,6 +4,8 @@ import { type Actions } from "../app/actions";
 import { type App, seenTakes, shownClip } from "../app/app";
 import { h, morph } from "../app/dom";
 import type { Files } from "../app/files";
+import { GHOSTS } from "../stage/theme";
+import { dialog } from "./dialog";
 import { icon } from "./icons";
 import { shownKey } from "./parts";
 
@@ -115,6 +117,7 @@ export function takeNames(app: App, root: HTMLElement): void {
         h(
           "span",
           { class: index === app.project.value.kept ? "chosen" : "" },
+          h("i", { style: `background:${GHOSTS[index % GHOSTS.length]}` }),
           `Take ${index + 1}${index === app.project.value.kept ? " · kept" : ""}`,
         ),
       ),
@@ -130,31 +133,21 @@ export function takeNames(app: App, root: HTMLElement): void {
   render();
 }
 
-export function help(app: App, actions: Actions, root: HTMLDialogElement): void {
-  const groups = [...new Set(Object.values(actions).map((action) => action.group))];
-  const close = () => app.session.update({ help: false });
-  root.append(
-    h("header", {}, h("h2", {}, "Keys"), h("button", { class: "cross", "aria-label": "Close", onclick: close }, "×")),
+export function help(app: App, actions: Actions): void {
+  const all = Object.values(actions).filter((one) => one.keys.length);
+  const groups = [...new Set(all.map((action) => action.group))];
+  const rows = (group: string) =>
+    all
+      .filter((one) => one.group === group)
+      .flatMap((one) => [
+        h("dt", {}, ...one.keys.slice(0, 2).map((key) => h("kbd", {}, shownKey(key)))),
+        h("dd", {}, one.label),
+      ]);
+  dialog(app, "help", "Keys", () => [
     h(
       "div",
       { class: "groups" },
-      ...groups.map((group) =>
-        h(
-          "section",
-          {},
-          h("h3", {}, group),
-          h(
-            "dl",
-            {},
-            ...Object.values(actions)
-              .filter((one) => one.group === group)
-              .flatMap((one) => [
-                h("dt", {}, ...one.keys.slice(0, 2).map((key) => h("kbd", {}, shownKey(key)))),
-                h("dd", {}, one.label),
-              ]),
-          ),
-        ),
-      ),
+      ...groups.map((group) => h("section", {}, h("h3", {}, group), h("dl", {}, ...rows(group)))),
       h(
         "section",
         {},
@@ -162,7 +155,7 @@ export function help(app: App, actions: Actions, root: HTMLDialogElement): void 
         h(
           "p",
           { class: "quiet" },
-          "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
+          "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap, Shift changes between pushing aside and lying over. Ctrl and the wheel zoom the timeline at the pointer.",
         ),
       ),
       h(
@@ -178,13 +171,7 @@ export function help(app: App, actions: Actions, root: HTMLDialogElement): void 
         ),
       ),
     ),
-  );
-  root.addEventListener("close", close);
-  app.session.subscribe((now, before) => {
-    if (now.help === before.help) return;
-    if (now.help) root.showModal();
-    else root.close();
-  });
+  ]);
 }
 
 /** Files dropped anywhere, or chosen in a dialog; gives what opens that dialog. */

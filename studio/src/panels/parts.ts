@@ -10,20 +10,23 @@ import { type Icon, icon } from "./icons";
 export function iconButton(
   action: Pick<Action, "label" | "keys" | "run">,
   name: Icon,
-  options: { pressed?: boolean; disabled?: boolean; title?: string } = {},
+  options: { pressed?: boolean; disabled?: boolean; title?: string; name?: string; fold?: boolean; key?: string } = {},
 ): HTMLElement {
-  const { pressed, disabled, title = action.label } = options;
+  const { pressed, disabled, title = action.label, name: word, fold, key } = options;
   return h(
     "button",
     {
-      class: "icon",
-      title: `${title} (${shownKey(action.keys[0]!)})`,
+      class: word ? "icon named" : "icon",
+      "data-fold": fold ?? false,
+      "data-key": key,
+      title: action.keys[0] ? `${title} (${shownKey(action.keys[0])})` : title,
       "aria-label": title,
       onclick: action.run,
       "aria-pressed": pressed === undefined ? null : String(pressed),
       disabled: disabled ?? false,
     },
     icon(name),
+    word && h("span", { "aria-hidden": "true" }, word),
   );
 }
 

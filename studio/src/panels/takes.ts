@@ -5,7 +5,7 @@ import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
 import type { Fan } from "../app/session";
-import type { Clip, Project } from "../project/model";
+import { type Clip, type Project, CHANGED, keptTake } from "../project/model";
 import { GHOSTS } from "../stage/theme";
 import { section, shownKey, textButton } from "./parts";
 
@@ -35,26 +35,38 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
             title: `Seed ${take.seed}, ${take.how}`,
           },
           h("i", {
-            style: `background:${project.takes.length > 1 && index !== project.kept ? GHOSTS[index % GHOSTS.length] : "var(--accent)"}`,
+            style: `background:${project.takes.length > 1 ? GHOSTS[index % GHOSTS.length] : "var(--accent)"}`,
           }),
           `${index + 1}`,
-          h("small", {}, take.how === "drawn" ? `seed ${take.seed}` : take.how),
+          h("small", {}, ["drawn", CHANGED].includes(take.how) ? `seed ${take.seed}` : take.how),
         ),
       ),
     ),
     ...(project.takes[project.kept]?.told ?? []).map((one) => h("p", { class: "quiet told" }, one)),
+    deepest(project) > 0 &&
+      h(
+        "p",
+        { class: "unmet" },
+        `The two are in each other by up to ${Math.round(deepest(project) * 100)} cm: red on the ruler.`,
+      ),
     clips.length > 1 &&
       h("div", { class: "row" }, textButton("Side by side", actions.beside!.run, { pressed: sideBySide, title: "B" })),
     h(
       "div",
       { class: "row wrap" },
       deed("draw", "Draw again"),
+      keptTake(project)?.how === CHANGED && deed("all", "Draw all blocks"),
       deed("four", project.count === 4 ? "One take" : "Four takes"),
       deed("predict", "What comes next", none),
       deed("loop", "Loop", none),
       deed("aside", "Put aside", none),
     ),
   );
+}
+
+/** Metres by which one body is in the other at most. */
+function deepest(project: Project): number {
+  return Math.max(0, ...(keptTake(project)?.overlaps ?? []).map((one) => one.depth));
 }
 
 export function fanSection(app: App, deeds: Deeds, fan: Fan): HTMLElement {

@@ -68,12 +68,22 @@ export function checked(found: unknown): Project {
     kept: Math.min(number(top.kept ?? 0, "kept", 0, 16), Math.max(takes.length - 1, 0)),
     drawn: typeof top.drawn === "string" ? top.drawn : "",
     clips: list(top.clips ?? [], "clips", 100).map((one, index) => clip(one, `clips[${index}]`)),
+    markers: list(top.markers ?? [], "markers", MOST_POINTS).map((one, index) => marker(one, `markers[${index}]`)),
     character: top.character ? character(top.character) : null,
     given: given(top.given, "given"),
   };
 }
 
 type Mapping = Record<string, unknown>;
+
+function marker(found: unknown, name: string) {
+  const one = mapping(found, name);
+  return {
+    id: word(one.id, `${name}.id`),
+    time: number(one.time, `${name}.time`, 0, LONGEST * MOST_SEGMENTS),
+    name: word(one.name ?? "", `${name}.name`),
+  };
+}
 
 function segment(found: unknown, name: string) {
   const one = mapping(found, name);
@@ -154,6 +164,27 @@ function take(found: unknown, name: string) {
     ...(given.told == null
       ? {}
       : { told: list(given.told, `${name}.told`, 100).map((one) => word(one, `${name}.told`)) }),
+    ...(given.overlaps == null
+      ? {}
+      : { overlaps: list(given.overlaps, `${name}.overlaps`, 10_000).map((one) => overlap(one, `${name}.overlaps`)) }),
+    ...(given.notes == null
+      ? {}
+      : { notes: list(given.notes, `${name}.notes`, 200).map((one, index) => note(one, `${name}.notes[${index}]`)) }),
+  };
+}
+
+function overlap(found: unknown, name: string) {
+  const given = mapping(found, name);
+  const [begin, end, depth] = ["begin", "end", "depth"].map((key) => number(given[key], `${name}.${key}`, 0, 86400));
+  return { begin: begin!, end: end!, depth: depth! };
+}
+
+function note(found: unknown, name: string) {
+  const given = mapping(found, name);
+  return {
+    text: word(given.text, `${name}.text`),
+    line: word(given.line, `${name}.line`),
+    instead: list(given.instead ?? [], `${name}.instead`, 10).map((one) => word(one, `${name}.instead`)),
   };
 }
 

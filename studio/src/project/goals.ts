@@ -1,7 +1,19 @@
 /** A project in the server's words: the structure of a timeline file and of a goal file. */
 
 import { JOINTS } from "../body/skeleton";
-import { type Path, type Person, type Project, type Segment, type Vec3, FPS, length, round, toFrame } from "./model";
+import {
+  type Note,
+  type Path,
+  type Person,
+  type Project,
+  type Segment,
+  type Vec3,
+  FPS,
+  keptTake,
+  length,
+  round,
+  toFrame,
+} from "./model";
 import { facings, timed } from "./path";
 import { transitionOf } from "./timeline";
 
@@ -78,8 +90,18 @@ export function timelineOf(project: Project, seed = project.seed): TimelineJson 
   return timeline;
 }
 
+/** What is remarked on the words of a block, of one person or of both. */
+export function notesOf(project: Project, one: Segment): readonly Note[] {
+  const said = [one.text, one.other, wordsOf(project, one)].map((text) => text.trim());
+  return keptTake(project)?.notes?.filter((note) => said.includes(note.text.trim())) ?? [];
+}
+
+/** What is asked of blocks that have no words yet, so that the others can be drawn. */
+export const STANDS = "a person stands still";
+
 function wordsOf(project: Project, one: Segment): string {
-  return project.people.length > 1 ? `${one.text} :: ${one.other.trim() || one.text}` : one.text;
+  const text = one.text.trim() ? one.text : STANDS;
+  return project.people.length > 1 ? `${text} :: ${one.other.trim() || text}` : text;
 }
 
 /** What the page asks, and what a file asks that the page only keeps. */

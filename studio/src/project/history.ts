@@ -5,6 +5,12 @@ export interface Entry<T> {
   readonly value: T;
 }
 
+/** What a history keeps of one project: what undo brings back and what redo does, the next of either at the end. */
+export interface Kept<T> {
+  readonly past: readonly Entry<T>[];
+  readonly future: readonly Entry<T>[];
+}
+
 /** How a change came about, for those who listen. */
 export interface Change {
   readonly label: string;
@@ -27,12 +33,18 @@ export interface ChangeOptions {
 const FOLLOWED = "another page";
 
 export class History<T> {
-  private past: Entry<T>[] = [];
-  private future: Entry<T>[] = [];
+  private past: Entry<T>[];
+  private future: Entry<T>[];
   private merge = "";
   private listeners = new Set<(value: T, change: Change) => void>();
 
-  constructor(private present: T) {}
+  constructor(
+    private present: T,
+    kept: Kept<T> = { past: [], future: [] },
+  ) {
+    this.past = [...kept.past];
+    this.future = [...kept.future];
+  }
 
   get value(): T {
     return this.present;
@@ -45,6 +57,25 @@ export class History<T> {
 
   get redoLabel(): string | null {
     return this.future.at(-1)?.label ?? null;
+  }
+
+  get kept(): Kept<T> {
+    return { past: this.past, future: this.future };
+  }
+
+  /** Every state from the first on, with what led to it, and the number of the present one. */
+  get states(): { readonly all: readonly Entry<T>[]; readonly now: number } {
+    const values = [
+      ...this.past.map((one) => one.value),
+      this.present,
+      ...this.future.map((one) => one.value).reverse(),
+    ];
+    const labels = [
+      "the beginning",
+      ...this.past.map((one) => one.label),
+      ...this.future.map((one) => one.label).reverse(),
+    ];
+    return { all: values.map((value, index) => ({ value, label: labels[index]! })), now: this.past.length };
   }
 
   subscribe(listener: (value: T, change: Change) => void): () => void {
@@ -84,6 +115,20 @@ export class History<T> {
     this.tell({ label: "", draft: false, typed: false, elsewhere: true });
   }
 
+  /** Begin with another value, which has a history of its own. */
+  begin(value: T, { past, future }: Kept<T>): void {
+    [this.past, this.future, this.present, this.merge] = [[...past], [...future], value, ""];
+    this.tell({ label: "", draft: false, typed: false, elsewhere: true });
+  }
+
+  /** Go to the state of that number of `states`. */
+  go(number: number): void {
+    const steps = number - this.past.length;
+    const [from, to] = steps < 0 ? [this.past, this.future] : [this.future, this.past];
+    for (let left = Math.abs(steps); left > 1; left -= 1) this.step(from, to);
+    if (steps) this.move(from, to, steps < 0 ? "Undo" : "Redo");
+  }
+
   undo(): boolean {
     return this.move(this.past, this.future, "Undo");
   }
@@ -93,13 +138,18 @@ export class History<T> {
   }
 
   private move(from: Entry<T>[], to: Entry<T>[], word: string): boolean {
+    const label = this.step(from, to);
+    if (label !== null) this.tell({ label: `${word} ${label}`, draft: false, typed: false });
+    return label !== null;
+  }
+
+  private step(from: Entry<T>[], to: Entry<T>[]): string | null {
     const entry = from.pop();
-    if (!entry) return false;
+    if (!entry) return null;
     to.push({ label: entry.label, value: this.present });
     this.present = entry.value;
     this.merge = "";
-    this.tell({ label: `${word} ${entry.label}`, draft: false, typed: false });
-    return true;
+    return entry.label;
   }
 
   private tell(change: Change): void {

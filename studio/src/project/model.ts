@@ -73,6 +73,9 @@ export interface Person {
   readonly poses: readonly Pose[];
 }
 
+/** How a take was made whose blocks were drawn one after the other, as they changed. */
+export const CHANGED = "changed";
+
 /** A motion that the server holds. */
 export interface Take {
   readonly motion: string;
@@ -83,6 +86,25 @@ export interface Take {
   readonly how: string;
   /** What happens in it, as it was measured, and what is remarked on its words: a sentence each. */
   readonly told?: readonly string[];
+  /** What is remarked on the words of single blocks. */
+  readonly notes?: readonly Note[];
+  /** Where one body is in the other. */
+  readonly overlaps?: readonly Overlap[];
+}
+
+/** Seconds in which two bodies are in each other, and by how many metres at most. */
+export interface Overlap {
+  readonly begin: number;
+  readonly end: number;
+  readonly depth: number;
+}
+
+/** A remark on some words. */
+export interface Note {
+  readonly text: string;
+  readonly line: string;
+  /** Sentences that are known, the nearest first. */
+  readonly instead: readonly string[];
 }
 
 /** A motion from a file, or one that was put aside. */
@@ -99,6 +121,13 @@ export const VERSION = 2;
 export interface Stamp {
   readonly id: string;
   readonly revision: number;
+}
+
+/** A time that somebody wants to find again. */
+export interface Marker {
+  readonly id: string;
+  readonly time: number;
+  readonly name: string;
 }
 
 export interface Project {
@@ -122,6 +151,8 @@ export interface Project {
   /** What `takes` were drawn from: `planKey` of that project. */
   readonly drawn: string;
   readonly clips: readonly Clip[];
+  /** Sorted by time. */
+  readonly markers: readonly Marker[];
   /** The user's own character, as the server knows it. */
   readonly character: { readonly id: string; readonly name: string } | null;
   /** What a timeline file asks of the whole and the page does not change: `guidance`, `start`, `path`. */
@@ -159,9 +190,15 @@ export function exampleProject(): Project {
     kept: 0,
     drawn: "",
     clips: [],
+    markers: [],
     character: null,
     given: null,
   };
+}
+
+/** A project in which nothing is said yet. */
+export function blankProject(): Project {
+  return { ...exampleProject(), segments: [segment("", 4)] };
 }
 
 /** Seconds of all segments. */

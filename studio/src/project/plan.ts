@@ -1,7 +1,7 @@
 /** Which jobs of the server make a project's motion. */
 
 import { type Project, type Range, begins, length } from "./model";
-import { asked, goalOf, timelineOf } from "./goals";
+import { STANDS, type TimelineJson, asked, goalOf, timelineOf } from "./goals";
 import { needsWay } from "./asks";
 import type { Place, Problem } from "./places";
 import { between } from "./timeline";
@@ -16,10 +16,9 @@ export type Plan = { jobs: Job[]; missing: null } | { jobs: []; missing: Problem
 
 export function plan(project: Project): Plan {
   if (project.base) return redraw(project);
-  const empty = project.segments.findIndex((one) => !one.text.trim());
-  if (empty >= 0) {
-    const at: Place = { kind: "segment", id: project.segments[empty]!.id };
-    return { jobs: [], missing: { message: `Block ${empty + 1} has no words yet; say what the person does.`, at } };
+  if (project.segments.every((one) => !one.text.trim())) {
+    const at: Place = { kind: "segment", id: project.segments[0]!.id };
+    return { jobs: [], missing: { message: "No block has words yet; say what the person does.", at } };
   }
   const who = needsWay(project);
   if (who >= 0) {
@@ -40,6 +39,29 @@ export function planKey(project: Project): string {
 /** Whether the takes are what the project asks for. */
 export function isDrawn(project: Project): boolean {
   return project.drawn === planKey(project);
+}
+
+/** Blocks whose motion on the stage was drawn from other words, by their ids. */
+export function stale(project: Project): ReadonlySet<string> {
+  const { segments, base, frozen, drawn } = project;
+  if (!project.takes.length || isDrawn(project)) return new Set();
+  if (base) {
+    const at = begins(segments);
+    const free = between(frozen, length(project));
+    const isFree = (index: number) => free.some(([from, to]) => from < at[index + 1]! - 1e-6 && to > at[index]! + 1e-6);
+    return new Set(segments.filter((_, index) => isFree(index)).map((one) => one.id));
+  }
+  const [job] = JSON.parse(drawn || "[]") as { timeline?: TimelineJson }[];
+  const old = job?.timeline?.segments.map((one) => one.text) ?? [];
+  const now = timelineOf(project).segments.map((one) => one.text);
+  if (!old.length) return new Set();
+  let first = 0;
+  while (first < Math.min(old.length, now.length) && old[first] === now[first]) first += 1;
+  let rest = 0;
+  while (rest < Math.min(old.length, now.length) - first && old.at(-1 - rest) === now.at(-1 - rest)) rest += 1;
+  const isSame = (index: number) => old.length === now.length && old[index] === now[index];
+  const changed = segments.slice(first, now.length - rest).filter((_, index) => !isSame(first + index));
+  return new Set(changed.map((one) => one.id));
 }
 
 /** The motion without its stretches that stay, each drawn from the words that are there. */
@@ -75,7 +97,7 @@ function redrawn({ base, only }: Project): number[] {
 function duet(project: Project): Job {
   const { seed, count, reactTo } = project;
   if (reactTo) {
-    const prompt = project.segments.map((one) => one.other.trim() || one.text.trim()).join(", then ");
+    const prompt = project.segments.map((one) => one.other.trim() || one.text.trim() || STANDS).join(", then ");
     return { task: "duet", react_to: reactTo.motion, prompt, seed, count };
   }
   const person = asked(project);

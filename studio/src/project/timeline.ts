@@ -80,17 +80,21 @@ export function moveSeam(project: Project, id: string, time: number): Project {
   return changeSegment(moved, next.id, { seconds: round(both - seconds) });
 }
 
-export function removeSegment(project: Project, id: string): Project {
-  if (project.segments.length < 2 || !project.segments.some((one) => one.id === id)) return project;
-  return unfrozen({ ...project, segments: project.segments.filter((one) => one.id !== id) });
+/** Without these blocks; where none is left, an empty one is there. */
+export function removeSegments(project: Project, ids: readonly string[]): Project {
+  const left = project.segments.filter((one) => !ids.includes(one.id));
+  if (left.length === project.segments.length) return project;
+  const isBlank = project.segments.length === 1 && !project.segments[0]!.text;
+  if (!left.length) return isBlank ? project : addSegment({ ...project, segments: [] });
+  return unfrozen({ ...project, segments: left });
 }
 
-export function duplicateSegment(project: Project, id: string): Project {
-  const index = project.segments.findIndex((one) => one.id === id);
-  if (index < 0) return project;
+/** Put copies of blocks before the one that is at `to`; gives the project and the ids of the copies. */
+export function pasteSegments(project: Project, blocks: readonly Segment[], to: number): [Project, string[]] {
+  const copies = blocks.map((one) => ({ ...one, id: newId() }));
   const segments = [...project.segments];
-  segments.splice(index + 1, 0, { ...segments[index]!, id: newId() });
-  return unfrozen({ ...project, segments });
+  segments.splice(clamp(to, 0, segments.length), 0, ...copies);
+  return [unfrozen({ ...project, segments }), copies.map((one) => one.id)];
 }
 
 /** Two segments with the same words where one was, if both are long enough. */
@@ -107,14 +111,53 @@ export function splitSegment(project: Project, time: number): Project {
   return { ...project, segments };
 }
 
-/** Put a segment before the one that is at `to` (counted without it). */
-export function moveSegment(project: Project, id: string, to: number): Project {
-  const index = project.segments.findIndex((one) => one.id === id);
-  if (index < 0 || index === clamp(to, 0, project.segments.length - 1)) return project;
-  const segments = [...project.segments];
-  const [one] = segments.splice(index, 1);
-  segments.splice(clamp(to, 0, segments.length), 0, one!);
+/** Put blocks before the one that is at `to` (counted without them); the others make room. */
+export function moveSegments(project: Project, ids: readonly string[], to: number): Project {
+  const moved = project.segments.filter((one) => ids.includes(one.id));
+  const segments = project.segments.filter((one) => !ids.includes(one.id));
+  segments.splice(clamp(to, 0, segments.length), 0, ...moved);
+  if (segments.every((one, index) => one === project.segments[index])) return project;
   return unfrozen({ ...project, segments });
+}
+
+/**
+ * Lay blocks over others so that they begin at `time`. All else stays when it is: what they cover is cut, and the time
+ * that they leave goes to the block before it, or to the one behind it at the beginning.
+ */
+export function layOver(project: Project, ids: readonly string[], time: number): Project {
+  const moved = project.segments.filter((one) => ids.includes(one.id));
+  const at = begins(project.segments);
+  const rest: { one: Segment; from: number; to: number }[] = [];
+  project.segments.forEach((one, index) => {
+    if (!ids.includes(one.id)) rest.push({ one, from: rest.length ? at[index]! : 0, to: at[index + 1]! });
+    else if (rest.length) rest.at(-1)!.to = at[index + 1]!;
+  });
+  if (!moved.length || !rest.length) return project;
+  const under = [...rest].reverse().find(({ from }) => from <= time) ?? rest[0]!;
+  let start = clamp(toFrame(time), 0, rest.at(-1)!.to);
+  if (start - under.from < SHORTEST) start = under.from;
+  let end = round(start + moved.reduce((sum, one) => sum + one.seconds, 0));
+  const cut = rest.find(({ from, to }) => from < end && end < to);
+  if (cut && cut.to - end < SHORTEST) end = cut.to;
+  const last = moved.at(-1)!;
+  const laid = [
+    ...moved.slice(0, -1),
+    { ...last, seconds: round(last.seconds + end - start - moved.reduce((sum, one) => sum + one.seconds, 0)) },
+  ];
+  const piece = ({ one, from, to }: (typeof rest)[number], low: number, high: number): Segment[] => {
+    const seconds = round(Math.min(to, high) - Math.max(from, low));
+    return seconds < SHORTEST ? [] : [{ ...one, seconds, id: from < low ? newId() : one.id }];
+  };
+  const segments = [
+    ...rest.flatMap((one) => piece(one, 0, start)),
+    ...laid,
+    ...rest.flatMap((one) => piece(one, end, Infinity)),
+  ];
+  const fits = segments.every(({ seconds }) => seconds <= LONGEST);
+  const isSame = segments.every(
+    (one, index) => one.id === project.segments[index]?.id && one.seconds === project.segments[index]!.seconds,
+  );
+  return !fits || isSame ? project : unfrozen({ ...project, segments });
 }
 
 /** The longest transition a segment may share with the one behind it. */

@@ -3,7 +3,7 @@
 import { type MotionClip, motionClip } from "../body/clip";
 import { filed, stampOf } from "../project/file";
 import type { TimelineJson } from "../project/goals";
-import type { Project, Stamp, Take } from "../project/model";
+import type { Note, Overlap, Project, Stamp, Take } from "../project/model";
 import { getJson, json, request } from "./http";
 import type { JobRequest } from "./types";
 
@@ -14,9 +14,15 @@ export interface Result {
   readonly frames: number;
   readonly people: number;
   /** What each person did, as it was measured. */
-  readonly happened?: readonly ({ readonly sentence: string } | null)[];
+  readonly happened?: Happened;
   readonly remarks?: readonly string[];
+  /** `redrawn`: the blocks that were drawn, where the others were kept of an older motion. */
+  readonly measures?: { readonly redrawn?: readonly number[]; readonly overlaps?: readonly Overlap[] };
+  /** The remarks that are about some words. */
+  readonly notes?: readonly Note[];
 }
+
+type Happened = readonly ({ readonly sentence: string } | null)[];
 
 export interface JobState {
   readonly id: string;
@@ -26,12 +32,9 @@ export interface JobState {
   readonly status: number | null;
   /** How the words were read, and which of them nobody learned. */
   readonly remarks?: readonly string[];
+  /** The same, each with the words that it is about. */
+  readonly notes?: readonly Note[];
   readonly results: readonly Result[];
-}
-
-interface MotionJson {
-  fps: number;
-  people: { positions: string; rotations?: string; root?: string }[];
 }
 
 export type Format = "bvh" | "glb" | "npz" | "mp4" | "png" | "html";
@@ -64,16 +67,23 @@ const CACHED = 40;
 export function motion(id: string): Promise<MotionClip> {
   const known = cache.get(id);
   if (known) return known;
-  const asked = getJson<MotionJson>(`motions/${encodeURIComponent(id)}`).then((found) =>
-    motionClip(
-      found.fps,
-      found.people.map((one) => floats(one.positions)),
-    ),
-  );
+  const asked = places(`motions/${encodeURIComponent(id)}`);
   cache.set(id, asked);
   asked.catch(() => cache.delete(id));
   if (cache.size > CACHED) cache.delete(cache.keys().next().value!);
   return asked;
+}
+
+/** The places of everybody's joints, as bytes: a text of them would have to be taken apart number by number. */
+async function places(path: string): Promise<MotionClip> {
+  const answer = await request(path, { headers: { Accept: "application/octet-stream" } });
+  const all = new Float32Array(await answer.arrayBuffer());
+  const [fps, count] = ["Motion-Fps", "Motion-People"].map((name) => Number(answer.headers.get(name)));
+  const size = all.length / count!;
+  return motionClip(
+    fps!,
+    Array.from({ length: count! }, (_, person) => all.subarray(person * size, (person + 1) * size)),
+  );
 }
 
 /** The address of a motion as a file. */
@@ -90,8 +100,11 @@ export async function uploadMotion(file: File, asf: string | null = null): Promi
   return getJson(`motions?${query}`, { method: "POST", body: file });
 }
 
-export async function uploadCharacter(file: File): Promise<{ id: string }> {
-  return getJson(`characters?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+/** `joints`: which of its joints are which, as far as somebody said so. */
+export async function uploadCharacter(file: File, joints: Record<string, string> = {}): Promise<{ id: string }> {
+  const query = new URLSearchParams({ name: file.name });
+  if (Object.keys(joints).length) query.set("joints", JSON.stringify(joints));
+  return getJson(`characters?${query}`, { method: "POST", body: file });
 }
 
 export async function bytes(path: string): Promise<Blob> {
@@ -120,6 +133,34 @@ export async function savedStamp(): Promise<Stamp | null> {
   return stampOf(await getJson("project/stamp"));
 }
 
+/** A project of the server's folder, as a list shows it. */
+export interface ProjectRow {
+  readonly id: string;
+  readonly name: string;
+  readonly saved: string;
+  readonly words: readonly string[];
+  readonly blocks: number;
+  readonly seconds: number;
+  readonly motion: string | null;
+  readonly open?: boolean;
+}
+
+/** The projects of the server's folder, the open one first. */
+export function projectRows(): Promise<readonly ProjectRow[]> {
+  return getJson("projects");
+}
+
+/** Let the server open another project of its folder. */
+export async function openProject(id: string): Promise<void> {
+  await request(`project/open?${new URLSearchParams({ id })}`, { method: "POST" });
+}
+
+/** A sentence as blocks: one for each action. */
+export async function blocksOf(sentence: string): Promise<readonly { text: string; seconds: number }[]> {
+  type Found = { segments: { text: string; seconds: number }[] };
+  return (await getJson<Found>("sentence.json", { method: "POST", body: sentence })).segments;
+}
+
 /** Let the server keep what it has under another name, which is given. */
 export async function putAside(): Promise<string> {
   return (await getJson<{ kept: string }>("project/aside", { method: "POST" })).kept;
@@ -136,9 +177,29 @@ export async function timelineJson(yaml: Blob): Promise<unknown> {
 }
 
 export function takeOf(result: Result, how: string): Take {
-  const { id, seed, seconds, people, happened = [], remarks = [] } = result;
-  const deeds = happened.map((one, who) => one && `${people > 1 ? `Person ${who + 1} ` : ""}${one.sentence}`);
-  return { motion: id, seed, seconds, people, how, told: [...deeds.filter((one) => one !== null), ...remarks] };
+  const { id, seed, seconds, people, happened = [], remarks = [], notes = [] } = result;
+  const others = remarks.filter((line) => !notes.some((one) => one.line === line));
+  const { overlaps = [] } = result.measures ?? {};
+  return { motion: id, seed, seconds, people, how, told: [...sentences(happened), ...others], notes, overlaps };
+}
+
+function sentences(happened: Happened): string[] {
+  const said = happened.map((one, who) => one && `${happened.length > 1 ? `Person ${who + 1} ` : ""}${one.sentence}`);
+  return said.filter((one) => one !== null);
+}
+
+const measured = new Map<string, Promise<string[]>>();
+
+/** What happens in a motion between two seconds, a sentence for each person. */
+export function deeds(motion: string, begin: number, end: number): Promise<string[]> {
+  const path = `motions/${encodeURIComponent(motion)}/deeds?begin=${begin}&end=${end}`;
+  const known = measured.get(path);
+  if (known) return known;
+  const asked = getJson<{ happened: Happened }>(path).then(({ happened }) => sentences(happened));
+  measured.set(path, asked);
+  asked.catch(() => measured.delete(path));
+  if (measured.size > 500) measured.delete(measured.keys().next().value!);
+  return asked;
 }
 
 /** Little-endian float32 in base64. */

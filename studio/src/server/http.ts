@@ -16,6 +16,8 @@ export class Refused extends Error {
     readonly status: number,
     /** Keys of what was sent that are the cause, such as `segments[1].goal`; empty: not known. */
     readonly where = "",
+    /** What came with the sentence. */
+    readonly about: Readonly<Record<string, unknown>> = {},
   ) {
     super(message);
   }
@@ -55,8 +57,9 @@ export function json(method: string, body: unknown): RequestInit {
 
 async function refusal(response: Response): Promise<Refused> {
   try {
-    const { error, where } = (await response.json()) as { error?: unknown; where?: unknown };
-    if (typeof error === "string") return new Refused(error, response.status, typeof where === "string" ? where : "");
+    const { error, where, ...about } = (await response.json()) as Record<string, unknown>;
+    if (typeof error === "string")
+      return new Refused(error, response.status, typeof where === "string" ? where : "", about);
   } catch {
     /* not the server's own answer */
   }

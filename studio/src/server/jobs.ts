@@ -81,8 +81,8 @@ function results(state: JobState): readonly Result[] {
   if (state.state === "failed")
     throw new Refused(state.error ?? "The job failed and did not say why.", state.status ?? 422);
   if (state.state === "cancelled") throw new DOMException("cancelled", "AbortError");
-  const { remarks = [] } = state;
-  return state.results.map((one) => ({ ...one, remarks: [...remarks, ...(one.remarks ?? [])] }));
+  const { remarks = [], notes = [] } = state;
+  return state.results.map((one) => ({ ...one, remarks: [...remarks, ...(one.remarks ?? [])], notes }));
 }
 
 function levelOf(json: LevelJson): Level {

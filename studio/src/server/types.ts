@@ -42,6 +42,8 @@ export interface ComposeRequest {
   readonly levels?: boolean | number;
   /** what a timeline file holds */
   readonly timeline: Timeline;
+  /** a motion of an earlier timeline; blocks that ask for the same keep its frames */
+  readonly kept_from?: string;
   /** the same seed makes the same motion: 0, or the timeline's */
   readonly seed?: number;
   /** strength of the text where a segment has none of its own: 2.5 */

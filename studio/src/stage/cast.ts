@@ -8,6 +8,8 @@ import { type FigureLook, type StageTheme } from "./theme";
 export interface Ghost {
   readonly clip: MotionClip;
   readonly color: string;
+  /** Seconds from the playhead; 0 where it is not said. */
+  readonly apart?: number;
 }
 
 const GHOST_OPACITY = 0.3;
@@ -49,7 +51,7 @@ export class Cast {
       one.group.visible = body !== undefined;
       if (!body) return;
       one.look(ghostLook(body.ghost.color, GHOST_OPACITY));
-      one.pose(poseAt(body.ghost.clip, body.person, time, this.pose));
+      one.pose(poseAt(body.ghost.clip, body.person, time + (body.ghost.apart ?? 0), this.pose));
     });
   }
 

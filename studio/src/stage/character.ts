@@ -3,7 +3,8 @@
 import { type App, problemOf } from "../app/app";
 import { keptTake } from "../project/model";
 import { bytes, motionFile } from "../server/api";
-import { type Actor, actorOf, parsed, placed } from "./actor";
+import { type Actor, actorOf, placed } from "./actor";
+import { unpackedFile } from "./packed";
 import type { Scene } from "./scene";
 
 export class Character {
@@ -50,7 +51,8 @@ export class Character {
 
   private async actor(motion: string, character: string, person: number | undefined): Promise<Actor> {
     const file = await bytes(motionFile(motion, "glb", { skeleton: character, person }));
-    const gltf = await parsed(await file.arrayBuffer());
+    const name = this.app.project.value.character?.name ?? "the character";
+    const gltf = await unpackedFile(await file.arrayBuffer(), name);
     return actorOf(gltf.scene, gltf.animations);
   }
 

@@ -9,6 +9,8 @@ import type { StageTheme } from "./theme";
 const SLOW = 45;
 const PATIENCE = 12;
 const COARSEST = 0.5;
+/** Of a coarse shadow map, so that what is round does not speckle itself. */
+const COARSE_BIAS = 0.06;
 /** Milliseconds without a new picture until a coarse one is drawn sharp. */
 const REST = 250;
 /** Where processors draw the pictures, as drivers call themselves. */
@@ -33,6 +35,7 @@ export class Scene {
   private drawn = 0;
   private isCoarse = false;
   private next = 0;
+  private lifted = 0;
   private readonly sizes = new ResizeObserver(() => this.resize());
 
   /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp a second later. */
@@ -64,7 +67,7 @@ export class Scene {
     this.orbit.dampingFactor = 0.12;
     this.orbit.maxPolarAngle = Math.PI / 2 - 0.03;
     this.orbit.minDistance = 0.8;
-    this.orbit.maxDistance = 25;
+    this.orbit.maxDistance = 40;
     this.orbit.addEventListener("change", () => this.invalidate());
     this.look(theme);
     this.software = isSoftware(this.renderer.getContext());
@@ -81,6 +84,12 @@ export class Scene {
     this.orbit.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
+  }
+
+  /** Show the middle of the picture so many pixels higher, where something lies over what is below. */
+  lift(pixels: number): void {
+    this.lifted = pixels;
+    this.resize();
   }
 
   invalidate(): void {
@@ -186,6 +195,7 @@ export class Scene {
   private coarsen(ratio: number): void {
     this.coarse = ratio;
     this.sun.shadow.mapSize.set(512, 512);
+    this.sun.shadow.normalBias = COARSE_BIAS;
     this.sun.shadow.map?.dispose();
     this.sun.shadow.map = null;
   }
@@ -202,6 +212,8 @@ export class Scene {
     if (!clientWidth || !clientHeight) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
+    if (this.lifted) this.camera.setViewOffset(clientWidth, clientHeight, 0, this.lifted, clientWidth, clientHeight);
+    else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.invalidate();
   }

@@ -7,6 +7,7 @@ import type { Ground } from "../project/path";
 import { Cast, type Ghost } from "./cast";
 import { Character } from "./character";
 import { PathTool, ring } from "./pathTool";
+import { Said } from "./said";
 import { Scene } from "./scene";
 import { TargetTool } from "./targetTool";
 import { DARK, GHOSTS, LIGHT, type StageTheme } from "./theme";
@@ -14,6 +15,8 @@ import { Trails } from "./trails";
 
 /** Pixels that the pointer may move in a click. */
 const CLICKED = 5;
+/** Seconds from the playhead at which the ghosts before and behind it are. */
+const AROUND = [-0.6, -0.3, 0.3, 0.6];
 
 export class Stage {
   readonly scene: Scene;
@@ -44,9 +47,11 @@ export class Stage {
     this.scene.scene.add(this.goal);
     this.scene.busy = () => app.session.value.drawing !== null || app.session.value.pending;
     this.scene.step = (elapsed) => this.step(elapsed);
+    const said = new Said(app, this.scene);
     this.scene.painted = () => {
       this.path.tell();
       this.targets.tell();
+      said.tell();
     };
     this.listen(canvas);
     app.project.subscribe(() => this.update());
@@ -79,6 +84,28 @@ export class Stage {
     this.scene.invalidate();
   }
 
+  /** Show all of the motion, from where the camera looks. */
+  frameAll(): void {
+    const clip = shownClip(this.app);
+    if (!clip) return;
+    const box = new THREE.Box3();
+    clip.people.forEach((_, person) => {
+      for (let frame = 0; frame < clip.frames; frame += 1)
+        box.expandByPoint(new THREE.Vector3(...jointAt(clip, person, 0, frame / clip.fps)));
+    });
+    const { orbit, camera } = this.scene;
+    const ball = box.expandByScalar(1).getBoundingSphere(new THREE.Sphere());
+    const half = (Math.min(camera.fov, camera.fov * camera.aspect) / 2) * (Math.PI / 180);
+    const arm = camera.position
+      .clone()
+      .sub(orbit.target)
+      .setLength(ball.radius / Math.sin(half));
+    this.app.session.update({ follow: false });
+    orbit.target.copy(ball.center);
+    camera.position.copy(ball.center).add(arm);
+    this.scene.invalidate();
+  }
+
   /** The picture as it is. */
   picture(): Promise<Blob | null> {
     return new Promise((done) => this.scene.canvas.toBlob(done));
@@ -93,6 +120,7 @@ export class Stage {
       "joint",
       "selection",
       "ghosts",
+      "around",
       "trails",
       "sideBySide",
       "fan",
@@ -126,14 +154,21 @@ export class Stage {
   }
 
   private ghosts(): Ghost[] {
-    const { fan, ghosts, time } = this.app.session.value;
+    const { fan, ghosts, around, time } = this.app.session.value;
     const clips = seenTakes(this.app);
+    const shown = shownClip(this.app);
+    const [, behind, before] = GHOSTS;
+    const own: Ghost[] =
+      around && shown && !fan && !this.app.live.value
+        ? AROUND.map((apart) => ({ clip: shown, color: apart < 0 ? before : behind, apart }))
+        : [];
     if (fan)
       return time <= fan.past ? [] : fan.clips.map((clip, index) => ({ clip, color: GHOSTS[index % GHOSTS.length]! }));
-    if (!ghosts || clips.length < 2 || this.app.live.value) return [];
-    return clips.flatMap((clip, index) =>
+    if (!ghosts || clips.length < 2 || this.app.live.value) return own;
+    const others = clips.flatMap((clip, index) =>
       index === this.app.project.value.kept ? [] : [{ clip, color: GHOSTS[index % GHOSTS.length]! }],
     );
+    return [...own, ...others];
   }
 
   /** One frame of real time. */

@@ -61,4 +61,4 @@ export const DARK: StageTheme = {
 };
 
 /** Futures and other takes, each in a colour of its own. */
-export const GHOSTS = ["#e07b39", "#3f8fd2", "#4fa36a", "#a86fc9", "#c9a227", "#d0587e", "#3aa6a0", "#8a7a66"] as const;
+export const GHOSTS = ["#3f8fd2", "#4fa36a", "#a86fc9", "#c9a227", "#d0587e", "#2fb0b8", "#7d8793", "#5a5fd0"] as const;

@@ -1,4 +1,4 @@
-/** Where pelvis and hands go, as lines in the air. */
+/** Where pelvis, hands and feet go, as lines in the air. */
 
 import type * as THREE from "three";
 import { type MotionClip, jointAt } from "../body/clip";
@@ -6,7 +6,7 @@ import { LEFT, PELVIS, RIGHT } from "../body/skeleton";
 import { Line } from "./lines";
 import type { StageTheme } from "./theme";
 
-const JOINTS = [PELVIS, LEFT.wrist, RIGHT.wrist];
+const JOINTS = [PELVIS, LEFT.wrist, RIGHT.wrist, LEFT.foot, RIGHT.foot];
 
 export class Trails {
   private readonly lines: Line[];

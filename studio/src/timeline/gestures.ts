@@ -1,10 +1,12 @@
 /** What the pointer does on the timeline: scrub, mark, drag edges, seams, transitions, blocks and keys. */
 
 import { type App, duration } from "../app/app";
+import { NOTHING, blocksChosen, chosenBlocks } from "../app/session";
 import { changePose, changeTarget, shiftTarget } from "../project/asks";
+import { changeMarker } from "../project/markers";
 import { type Project, begins, clamp, length, newId, round } from "../project/model";
 import { halfSeconds, snap } from "../project/snap";
-import { moveSeam, moveSegment, resizeSegment, setTransition, transitionOf } from "../project/timeline";
+import { layOver, moveSeam, moveSegments, resizeSegment, setTransition, transitionOf } from "../project/timeline";
 import type { TimelineView } from "./view";
 
 /** Pixels within which a time catches on a mark, and that a block is moved before it is being dragged. */
@@ -21,9 +23,11 @@ export function listen(app: App, view: TimelineView, root: HTMLElement): void {
   root.addEventListener("pointerdown", (event) => {
     const handle = (event.target as Element).closest<HTMLElement>("[data-drag]");
     if (!handle || event.button !== 0 || event.target instanceof HTMLInputElement) return;
+    if ((event.target as Element).closest("button:not([data-drag])")) return;
     gesture = begin(app, view, handle, event);
     root.setPointerCapture(event.pointerId);
-    if (handle.dataset.drag !== "block" && handle.dataset.drag !== "second") event.preventDefault();
+    const takesFocus = ["block", "second", "marker"].includes(handle.dataset.drag!);
+    if (!takesFocus || event.ctrlKey || event.metaKey || event.shiftKey) event.preventDefault();
   });
   root.addEventListener("pointermove", (event) => gesture?.move(view.timeAt(event.clientX), event));
   const end = (event: PointerEvent) => {
@@ -42,7 +46,7 @@ export function listen(app: App, view: TimelineView, root: HTMLElement): void {
     (event) => {
       if (!event.ctrlKey) return;
       event.preventDefault();
-      view.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15);
+      view.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15, event.clientX);
     },
     { passive: false },
   );
@@ -95,8 +99,15 @@ function begin(app: App, view: TimelineView, handle: HTMLElement, event: Pointer
         changePose(project, who, id, { time: clamp(time, 0, length(project)) }),
       );
     }
+    case "marker": {
+      app.session.update({ selection: { kind: "marker", id } });
+      const marker = app.project.value.markers.find((one) => one.id === id);
+      return edits("move a marker", marker?.time ?? 0, (project, time) => changeMarker(project, id, { time }));
+    }
+    case "band":
+      return event.pointerType === "touch" ? panning(view, event) : framing(app, view, event);
     default:
-      return reordering(app, view, handle, id, event.clientX);
+      return chosenBy(event, app, id) ? STILL : moving(app, view, root(handle), id, event, caught);
   }
 }
 
@@ -113,7 +124,8 @@ function marks(app: App): number[] {
     ...person.targets.map((one) => one.time),
     ...person.poses.map((one) => one.time),
   ]);
-  return [...halfSeconds(duration(app) + 2), ...begins(value.segments), time, ...asked];
+  const marked = value.markers.map((one) => one.time);
+  return [...halfSeconds(duration(app) + 2), ...begins(value.segments), time, ...asked, ...marked];
 }
 
 function scrubbing(app: App, start: number): Gesture {
@@ -150,33 +162,113 @@ function editing(
   };
 }
 
-/** The block goes with the pointer, and lands between the others. */
-function reordering(app: App, view: TimelineView, handle: HTMLElement, id: string, from: number): Gesture {
-  app.session.update({ selection: { kind: "segment", id } });
-  let isDragged = false;
+const STILL: Gesture = { move: () => undefined, end: () => undefined };
+
+/** With Ctrl a block is selected besides, or no more; with Shift, all up to it. True: the press was for that alone. */
+function chosenBy(event: PointerEvent, app: App, id: string): boolean {
+  const { selection } = app.session.value;
+  const ids = chosenBlocks(selection);
+  if (event.ctrlKey || event.metaKey) {
+    const left = ids.includes(id) ? ids.filter((one) => one !== id) : [id, ...ids];
+    app.session.update({ selection: blocksChosen(left) });
+    return true;
+  }
+  const all = app.project.value.segments.map((one) => one.id);
+  const [from, to] = [all.indexOf(ids[0] ?? id), all.indexOf(id)];
+  if (!event.shiftKey || from === to) return false;
+  const between = all.slice(Math.min(from, to), Math.max(from, to) + 1);
+  app.session.update({ selection: blocksChosen([ids[0]!, ...between.filter((one) => one !== ids[0])]) });
+  return true;
+}
+
+/** A frame drawn over the blocks selects those in it; a press beside them selects nothing. */
+function framing(app: App, view: TimelineView, { clientX, clientY }: PointerEvent): Gesture {
   return {
-    move(_, event) {
-      isDragged ||= Math.abs(event.clientX - from) > DRAGGED;
-      if (!isDragged) return;
-      handle.classList.add("dragged");
-      handle.style.transform = `translateX(${event.clientX - from}px)`;
+    move: (_, event) => {
+      const found = view.frame([clientX, clientY], [event.clientX, event.clientY]);
+      const old = chosenBlocks(app.session.value.selection);
+      if (found.join() !== old.join()) app.session.update({ selection: blocksChosen(found) });
     },
-    end(time) {
-      handle.classList.remove("dragged");
-      handle.style.transform = "";
+    end: (_, event) => {
+      if (Math.hypot(event.clientX - clientX, event.clientY - clientY) < DRAGGED)
+        app.session.update({ selection: NOTHING });
+      view.frame(null);
+    },
+  };
+}
+
+/** A finger moves the timeline. */
+function panning(view: TimelineView, { clientX }: PointerEvent): Gesture {
+  const start = view.scroll.scrollLeft;
+  const go = (_: number, event: PointerEvent) => (view.scroll.scrollLeft = start + clientX - event.clientX);
+  return { move: go, end: () => undefined };
+}
+
+/** Blocks go with the pointer, and land between the others or over them. */
+function moving(
+  app: App,
+  view: TimelineView,
+  root: HTMLElement,
+  id: string,
+  pressed: PointerEvent,
+  caught: (time: number, event: PointerEvent) => number,
+): Gesture {
+  const chosen = chosenBlocks(app.session.value.selection);
+  const ids = chosen.includes(id) ? chosen : [id];
+  if (ids.length === 1) app.session.update({ selection: { kind: "segment", id } });
+  const { segments } = app.project.value;
+  const at = begins(segments);
+  const first = at[segments.findIndex((one) => ids.includes(one.id))]!;
+  const seconds = segments.filter((one) => ids.includes(one.id)).reduce((sum, one) => sum + one.seconds, 0);
+  const offset = view.timeAt(pressed.clientX) - first;
+  const isOver = (event: PointerEvent) => app.session.value.overwriting !== event.shiftKey;
+  let isDragged = false;
+  const blocks = () => ids.flatMap((one) => [...root.querySelectorAll<HTMLElement>(`.block[data-id="${one}"]`)]);
+  return {
+    move(time, event) {
+      isDragged ||= Math.abs(event.clientX - pressed.clientX) > DRAGGED;
       if (!isDragged) return;
-      app.project.change("move a block", (old) => moveSegment(old, id, landing(old, id, time)));
+      for (const one of blocks()) {
+        one.classList.add("dragged");
+        one.style.transform = `translateX(${event.clientX - pressed.clientX}px)`;
+      }
+      if (isOver(event)) view.mark(Math.max(caught(time - offset, event), 0), seconds);
+      else view.mark(seam(app.project.value, ids, landing(app.project.value, ids, time)));
+    },
+    end(time, event) {
+      for (const one of blocks()) {
+        one.classList.remove("dragged");
+        one.style.transform = "";
+      }
+      view.mark(null);
+      if (!isDragged) return app.session.update({ selection: { kind: "segment", id } });
+      app.project.change(ids.length > 1 ? "move blocks" : "move a block", (old) =>
+        isOver(event)
+          ? layOver(old, ids, caught(time - offset, event))
+          : moveSegments(old, ids, landing(old, ids, time)),
+      );
       view.render();
     },
   };
 }
 
 /** The place among the other blocks whose middle is behind `time`. */
-export function landing(project: Project, id: string, time: number): number {
+export function landing(project: Project, ids: readonly string[], time: number): number {
   const at = begins(project.segments);
   let place = 0;
   project.segments.forEach((one, index) => {
-    if (one.id !== id && (at[index]! + at[index + 1]!) / 2 < time) place += 1;
+    if (!ids.includes(one.id) && (at[index]! + at[index + 1]!) / 2 < time) place += 1;
   });
   return place;
+}
+
+/** The time, as the blocks lie now, before the one that is at `place` among those that are not moved. */
+function seam(project: Project, ids: readonly string[], place: number): number {
+  const at = begins(project.segments);
+  const others = project.segments.flatMap((one, index) => (ids.includes(one.id) ? [] : [index]));
+  return others[place] === undefined ? at.at(-1)! : at[others[place]]!;
+}
+
+function root(handle: HTMLElement): HTMLElement {
+  return handle.closest<HTMLElement>(".content")!;
 }

@@ -2,12 +2,17 @@
 
 import { type App, duration, shownClip } from "../app/app";
 import { h, morph } from "../app/dom";
+import { chosenBlocks } from "../app/session";
 import { jointName } from "../body/skeleton";
 import { UNMET, isMeasurable, isUnmet, pathMiss, poseMiss, targetMiss } from "../project/misses";
-import { type Person, type Project, begins, length, round } from "../project/model";
+import { notesOf } from "../project/goals";
+import { stale } from "../project/plan";
+import { tips } from "./tip";
+import { type Person, type Project, begins, keptTake, length, round } from "../project/model";
 import { timed } from "../project/path";
 import type { Place } from "../project/places";
 import { transitionOf } from "../project/timeline";
+import { Figures } from "./figures";
 
 export interface TimelineCalls {
   readonly write: (id: string, text: string, second: boolean) => void;
@@ -16,8 +21,13 @@ export interface TimelineCalls {
 }
 
 /** Behind the end of the motion there is room to drag. */
-const ROOM = 2;
+const ROOM = 168;
+/** Pixels that are free beside a timeline that fits. */
+const FIT = 44;
 const LABELS = { words: "Words", other: "Words 2", path: "Path", joints: "Joints", poses: "Poses" } as const;
+
+/** What a press of the pointer does to a block's words, as far as that is true of this pointer. */
+const WRITE = matchMedia("(pointer: coarse)").matches ? "tap twice to write" : "double-click to write";
 
 export class TimelineView {
   /** Pixels of one second. */
@@ -26,7 +36,12 @@ export class TimelineView {
   editing: { id: string; second: boolean } | null = null;
   private readonly labels = h("div", { class: "labels", "aria-hidden": "true" });
   private readonly content = h("div", { class: "content" });
+  private readonly rows = h("div");
   readonly scroll = h("div", { class: "scroll", tabindex: "-1" }, this.content);
+  /** Where what is dragged or pasted comes to lie. */
+  private readonly landing = h("div", { class: "landing", "aria-hidden": "true", hidden: true });
+  private readonly band = h("div", { class: "band", "aria-hidden": "true", hidden: true });
+  private readonly figures: Figures;
   private readonly playhead = h("div", { class: "playhead", "aria-hidden": "true" }, h("i"));
 
   constructor(
@@ -35,6 +50,9 @@ export class TimelineView {
     private readonly calls: TimelineCalls,
   ) {
     root.append(this.labels, this.scroll);
+    tips(app, this.scroll);
+    this.figures = new Figures(app, this.scroll, () => this.scale);
+    this.content.append(this.rows, this.figures.canvas, this.band, this.landing, this.playhead);
     app.project.subscribe(() => this.render());
     app.session.subscribe((now, before) => {
       if (now.time !== before.time) this.movePlayhead();
@@ -51,9 +69,41 @@ export class TimelineView {
     return (clientX - this.content.getBoundingClientRect().left) / this.scale;
   }
 
-  zoom(factor: number): void {
-    this.scale = Math.min(Math.max(this.scale * factor, 8), 400);
+  /** Zoom; what is at `clientX`, or at the playhead, stays where it is on the screen. */
+  zoom(factor: number, clientX?: number): void {
+    const time = clientX === undefined ? this.app.session.value.time : this.timeAt(clientX);
+    const x = time * this.scale - this.scroll.scrollLeft;
+    this.scale = Math.min(Math.max(this.scale * factor, 4), 400);
     this.render();
+    this.scroll.scrollLeft = time * this.scale - x;
+  }
+
+  /** All of the motion at once. */
+  fit(): void {
+    this.zoom((this.scroll.clientWidth - FIT) / Math.max(duration(this.app), 0.2) / this.scale);
+    this.scroll.scrollLeft = 0;
+  }
+
+  /** Show where what is dragged will begin, and for how long it lies over others; null: nowhere. */
+  mark(time: number | null, seconds = 0): void {
+    this.landing.hidden = time === null;
+    if (time !== null) this.landing.style.cssText = this.span(time, time + seconds);
+    this.landing.classList.toggle("over", seconds > 0);
+  }
+
+  /** Show the frame that selects blocks, between two places of the window; gives the blocks in it. */
+  frame(from: readonly [number, number] | null, to: readonly [number, number] = [0, 0]): string[] {
+    this.band.hidden = from === null;
+    if (!from) return [];
+    const box = this.content.getBoundingClientRect();
+    const [left, right] = [Math.min(from[0], to[0]), Math.max(from[0], to[0])];
+    const [top, bottom] = [Math.min(from[1], to[1]), Math.max(from[1], to[1])];
+    this.band.style.cssText = `left:${left - box.left}px;top:${top - box.top}px;width:${right - left}px;height:${bottom - top}px`;
+    const inside = [...this.content.querySelectorAll<HTMLElement>(".block")].filter((one) => {
+      const at = one.getBoundingClientRect();
+      return at.left < right && at.right > left && at.top < bottom && at.bottom > top;
+    });
+    return [...new Set(inside.map((one) => one.dataset.id!))];
   }
 
   edit(id: string, second = false): void {
@@ -68,20 +118,25 @@ export class TimelineView {
   render(): void {
     const { value } = this.app.project;
     const two = value.people.length > 1;
+    // The colour of who is asked.
+    const who = (name: keyof typeof LABELS) =>
+      two &&
+      h("i", { class: `asked who${name === "words" ? 0 : name === "other" ? 1 : this.app.session.value.person}` });
     const tracks = ["words", ...(two ? (["other"] as const) : []), "path", "joints", "poses"] as const;
     morph(this.labels, [
       h("span", { class: "ruler" }),
-      ...tracks.map((name) => h("span", { class: `track ${name}` }, this.label(name, two))),
+      ...tracks.map((name) => h("span", { class: `track ${name}` }, who(name), this.label(name, two))),
     ]);
     const end = duration(this.app);
-    this.content.style.width = `${(end + ROOM) * this.scale}px`;
+    this.content.style.width = `${end * this.scale + ROOM}px`;
     const rows = [
       this.ruler(end),
       this.words(value, false),
       ...(two ? [this.words(value, true)] : []),
       ...this.asks(value),
     ];
-    morph(this.content, [...rows, this.playhead.isConnected ? this.content.lastChild! : this.playhead]);
+    morph(this.rows, rows);
+    this.figures.later();
     this.movePlayhead();
   }
 
@@ -100,7 +155,7 @@ export class TimelineView {
 
   private ruler(end: number): HTMLElement {
     const step = [1, 2, 5, 10, 30, 60].find((one) => one * this.scale >= 52) ?? 60;
-    const marks = Array.from({ length: Math.floor((end + ROOM) / step) + 1 }, (_, index) =>
+    const marks = Array.from({ length: Math.floor((end + ROOM / this.scale) / step) + 1 }, (_, index) =>
       h("span", { class: "mark", style: this.left(index * step) }, `${index * step} s`),
     );
     const { range } = this.app.session.value;
@@ -108,24 +163,61 @@ export class TimelineView {
       h("span", { class: "frozen", style: this.span(from, to), title: "Frozen: stays as it is" }),
     );
     const marked = range && h("span", { class: "range", style: this.span(range[0], range[1]) });
+    const overlaps = (keptTake(this.app.project.value)?.overlaps ?? []).map(({ begin, end, depth }) =>
+      h("span", {
+        class: "overlap",
+        style: this.span(begin, end),
+        title: `The two are in each other by up to ${Math.round(depth * 100)} cm`,
+      }),
+    );
     return h(
       "div",
       {
         class: "ruler",
         "data-drag": "ruler",
         "data-key": "ruler",
+        "data-same": JSON.stringify([
+          this.scale,
+          end,
+          range,
+          this.app.project.value.frozen,
+          overlaps.map((one) => [one.title, one.style.left]),
+        ]),
         "aria-label": "Time: drag to scrub, Shift and drag to mark a stretch",
       },
       ...marks,
       ...frozen,
+      ...overlaps,
       marked,
+      ...this.markers(),
+    );
+  }
+
+  private markers(): HTMLElement[] {
+    const { selection } = this.app.session.value;
+    return this.app.project.value.markers.map(({ id, time, name }) =>
+      h(
+        "button",
+        {
+          class: `marker${selection.kind === "marker" && selection.id === id ? " chosen" : ""}`,
+          style: this.left(time),
+          "data-drag": "marker",
+          "data-id": id,
+          "data-key": id,
+          title: `${name} at ${time.toFixed(2)} s`,
+          "aria-label": `${name} at ${time.toFixed(2)} seconds`,
+          onfocus: () => this.app.session.update({ selection: { kind: "marker", id } }),
+        },
+        h("span", {}, name),
+      ),
     );
   }
 
   private words(project: Project, second: boolean): HTMLElement {
     const at = begins(project.segments);
-    const blocks = project.segments.flatMap((_, index) => [
-      this.block(project, index, at[index]!, second),
+    const old = stale(project);
+    const blocks = project.segments.flatMap((one, index) => [
+      this.block(project, index, at[index]!, second, old.has(one.id)),
       ...(second || index === project.segments.length - 1 ? [] : [this.transition(project, index, at[index + 1]!)]),
     ]);
     const frozen = project.frozen.map(([from, to], index) =>
@@ -152,8 +244,9 @@ export class TimelineView {
       "div",
       {
         class: `track words${second ? " other" : ""}`,
+        "data-drag": "band",
         "data-key": `words${second}`,
-        role: "list",
+        role: "group",
         "aria-label": second ? "What the second person does" : "What the person does",
       },
       ...blocks,
@@ -190,13 +283,14 @@ export class TimelineView {
     return at?.kind === kind && (!id || !("id" in at) || at.id === id);
   }
 
-  private block(project: Project, index: number, at: number, second: boolean): HTMLElement {
+  private block(project: Project, index: number, at: number, second: boolean, isOld: boolean): HTMLElement {
     const one = project.segments[index]!;
     const { selection } = this.app.session.value;
-    const chosen = selection.kind === "segment" && selection.id === one.id;
+    const chosen = chosenBlocks(selection).includes(one.id);
     const isEdited = this.editing?.id === one.id && this.editing.second === second;
     const text = second ? one.other : one.text;
-    const shown = text || (second ? "does the same" : "say what happens");
+    const shown = text || (second ? "does the same" : WRITE);
+    const state = isOld ? "still the old motion" : text || second ? "" : "stands still";
     const words = isEdited
       ? h("input", {
           class: "words",
@@ -210,27 +304,46 @@ export class TimelineView {
           onblur: () => this.stopEditing(),
         })
       : h("span", { class: text ? "words" : "words empty" }, shown);
+    const notes = notesOf(project, one).filter((note) => second === (note.text.trim() === one.other.trim()));
+    const before = index > 0 && project.segments[index - 1]!.id;
+    const same = [
+      index,
+      at,
+      one.seconds,
+      this.scale,
+      shown,
+      state,
+      chosen,
+      before,
+      this.isWrong("segment", one.id),
+      notes.length,
+    ];
     return h(
       "div",
       {
-        class: `block${chosen ? " chosen" : ""}${this.isWrong("segment", one.id) ? " wrong" : ""}`,
+        "data-same": isEdited ? null : same.join(),
+        class: `block${chosen ? " chosen" : ""}${isOld ? " old" : ""}${this.isWrong("segment", one.id) ? " wrong" : ""}`,
         style: this.span(at, at + one.seconds),
         tabindex: "0",
-        role: "listitem",
+        role: "group",
+        "aria-roledescription": "block",
         "data-drag": second ? "second" : "block",
         "data-id": one.id,
         "data-key": one.id,
-        "aria-label": `Block ${index + 1}: ${shown}, ${one.seconds} seconds`,
-        onfocus: () => this.app.session.update({ selection: { kind: "segment", id: one.id } }),
+        "aria-label": `Block ${index + 1}: ${shown}, ${one.seconds} seconds${state && `, ${state}`}`,
+        title: second ? null : WRITE,
+        onfocus: () => chosen || this.app.session.update({ selection: { kind: "segment", id: one.id } }),
       },
       words,
-      h("small", {}, `${round(one.seconds)} s`),
+      h("small", {}, `${round(one.seconds)} s${state && ` · ${state}`}`),
+      notes.length > 0 &&
+        h("b", { class: "noted", role: "img", "aria-label": notes.map((note) => note.line).join("; ") }, "?"),
       !second &&
-        index > 0 &&
+        before &&
         h("i", {
           class: "edge from",
           "data-drag": "seam",
-          "data-id": project.segments[index - 1]!.id,
+          "data-id": before,
           title: "Drag the seam",
         }),
       !second && h("i", { class: "edge to", "data-drag": "end", "data-id": one.id, title: "Drag the length" }),
@@ -253,6 +366,7 @@ export class TimelineView {
       "div",
       {
         class: "transition",
+        "data-same": [seam, half, this.scale].join(),
         "data-key": `t${project.segments[index]!.id}`,
         style: this.span(seam - half, seam + half),
         title: `Transition: ${round(half * 2)} s`,
@@ -297,7 +411,12 @@ export class TimelineView {
         ]
       : [h("span", { class: "hint" }, "P, then draw on the floor")];
     const said = this.said((at) => (at.kind === "path" && at.who === who ? 0 : null));
-    return h("div", { class: "track path", "data-key": "path", "aria-label": "Path" }, ...children, said);
+    return h(
+      "div",
+      { class: "track path", "data-drag": "band", "data-key": "path", "aria-label": "Path" },
+      ...children,
+      said,
+    );
   }
 
   private jointTrack(project: Project, person: Person, who: number): HTMLElement {
@@ -326,7 +445,7 @@ export class TimelineView {
     });
     return h(
       "div",
-      { class: "track joints", "data-key": "joints", "aria-label": "Targets of joints" },
+      { class: "track joints", "data-drag": "band", "data-key": "joints", "aria-label": "Targets of joints" },
       ...(keys.length ? keys : [h("span", { class: "hint" }, "T, then drag a joint")]),
       this.said((at) =>
         at.kind === "target" && at.who === who ? (person.targets.find((one) => one.id === at.id)?.time ?? null) : null,
@@ -353,7 +472,7 @@ export class TimelineView {
     });
     return h(
       "div",
-      { class: "track poses", "data-key": "poses", "data-drop": "pose", "aria-label": "Poses" },
+      { class: "track poses", "data-drag": "band", "data-key": "poses", "data-drop": "pose", "aria-label": "Poses" },
       ...(keys.length ? keys : [h("span", { class: "hint" }, "O keeps the pose at hand")]),
       this.said((at) =>
         at.kind === "pose" && at.who === who ? (person.poses.find((one) => one.id === at.id)?.time ?? null) : null,

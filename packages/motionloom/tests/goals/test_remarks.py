@@ -47,4 +47,7 @@ def test_phrases_that_nobody_looked_at() -> None:
     said = remarks_on(
         ["eine Person geht vorwärts", "vacuuming the living room", "a person walks"], prior.known, prior.text
     )
-    assert list(said) == ["eine Person geht vorwärts", "vacuuming the living room"]
+    assert [one.text for one in said] == ["eine Person geht vorwärts", "vacuuming the living room"]
+    assert said[0].instead == ()
+    assert len(said[1].instead) == 3
+    assert all(f"'{sentence}'" in said[1].line for sentence in said[1].instead)

@@ -64,7 +64,9 @@ def test_a_jump_has_its_height() -> None:
 
 @pytest.mark.parametrize(("times", "said"), [(1, "squats once"), (2, "squats twice"), (3, "squats 3 times")])
 def test_squats_are_counted(times: int, said: str) -> None:
-    assert deeds_at(lowered(standing(7.0), 0.4 * waves(7.0, times))).sentence == said
+    did = deeds_at(lowered(standing(7.0), 0.4 * waves(7.0, times)))
+    assert did.sentence == said
+    assert json.loads(json.dumps(did.public()))["counts"] == {"squats": times}
 
 
 def test_who_goes_down_and_stays_ends_down_and_did_no_squat() -> None:

@@ -1,7 +1,9 @@
 """Files in and out: exports that read back, uploads, characters, and names that are no names."""
 
+import json
 import socket
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -192,6 +194,34 @@ def test_a_character_without_a_person_in_it_is_refused(server: Server) -> None:
     status, answer = server.json("POST", "/characters?name=box.bvh", b"HIERARCHY\nROOT box\n{\nOFFSET 0 0 0\n}\n")
     assert status == 400
     assert answer["error"]
+
+
+def test_joints_that_nobody_can_guess_are_named_and_kept(server: Server, walk: str, tmp_path: Path) -> None:
+    """A refused character comes back with its joints; named, it moves as the same one with plain names does."""
+    odd = Hero(seed=4)
+    names = {node["name"]: f"part {number}" for number, node in enumerate(odd.json["nodes"][:22])}
+    for node in odd.json["nodes"][:22]:
+        node["name"] = names[node["name"]]
+    odd.json["nodes"][19]["children"] = []  # the hand hangs elsewhere: the shape says nothing either
+    odd.json["nodes"][0]["children"].append(21)
+    data = odd.write(tmp_path / "odd.glb").read_bytes()
+    status, refused = server.json("POST", "/characters?name=odd.glb", data)
+    assert (status, "no joint was found for" in refused["error"]) == (400, True)
+    assert {one["name"] for one in refused["joints"]} >= set(names.values())
+    assert refused["joints"][0].keys() == {"name", "parent", "place"}
+    assert set(refused["guesses"].values()) <= set(names.values())
+    wrong = quote(json.dumps({"left_hip": "nobody"}))
+    assert "nobody" in server.json("POST", f"/characters?name=odd.glb&joints={wrong}", data)[1]["error"]
+    assert server.json("POST", "/characters?name=odd.glb&joints=5", data)[0] == 400
+    said = quote(json.dumps(names))
+    status, taken = server.json("POST", f"/characters?name=odd.glb&joints={said}", data)
+    assert status == 201, taken
+    assert taken["joints"]["left_knee"] == [names["left_knee"]]
+    status, _, moving = server.ask("GET", f"/motions/{walk}.glb?skeleton={taken['id']}")
+    assert status == 200
+    (tmp_path / "moving.glb").write_bytes(moving)
+    character = load_character(tmp_path / "moving.glb", joint_map=names)
+    assert character.joints.names()["left_wrist"] == {names["left_wrist"]: 1.0}
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,8 @@ def test_a_goal_is_measured_item_by_item(project: Project) -> None:
     assert counts == [1, 1, 1]
 
 
-def test_motions_make_room_but_never_those_that_the_project_names(tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_open", [True, False])
+def test_motions_make_room_but_never_those_that_a_project_names(tmp_path: Path, is_open: bool) -> None:
     import numpy as np
 
     from motionloom import SMPL22, Motion
@@ -89,7 +90,8 @@ def test_motions_make_room_but_never_those_that_the_project_names(tmp_path: Path
     small = Project(tmp_path, Limits(motions=3))
     still = Motion(SMPL22, 20.0, np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 22, 1)))
     first = small.add([still], {})
-    small.save_project(json.dumps({"takes": [first.id]}).encode())
+    named = json.dumps({"id": "film", "takes": [first.id]}).encode()
+    small.save_project(named) if is_open else small.shelf.keep("film", named)
     others = [small.add([still, still], {}).id for _ in range(4)]
     assert small.motion(first.id).people
     assert len(small.motion(others[-1]).people) == 2

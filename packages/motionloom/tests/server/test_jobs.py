@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from motionloom import Prior, generate
+from motionloom.kinematics.capsules import overlaps
 from tests.server.serving import Server, decoded
 
 PATH = {"path": {"points": [[0, 0], [0.5, 1], [0, 2]]}}
@@ -84,7 +85,34 @@ def test_words_that_nobody_learned_are_remarked_on(server: Server) -> None:
         made = server.draw(**asked | {"seconds": 1.0, "steps": 2})
         assert any("does not look like English" in line for line in made["remarks"])
     plain = server.draw(task="generate", prompt="a person walks", seconds=1.0, steps=2)
-    assert plain["remarks"] == []
+    assert plain["remarks"] == plain["notes"] == []
+
+
+def test_remarks_name_their_words_and_sentences_that_are_known(server: Server) -> None:
+    words, foreign = "vacuuming the living room", "eine Person geht vorwärts"
+    timeline = {"segments": [{"text": text, "seconds": 1.0} for text in ("a person walks", words, foreign, words)]}
+    made = server.draw(task="compose", timeline=timeline, steps=2)
+    assert [note["text"] for note in made["notes"]] == [foreign, words]
+    assert [note["line"] for note in made["notes"]] == made["remarks"]
+    assert [len(note["instead"]) for note in made["notes"]] == [0, 3]
+    instead = made["notes"][1]["instead"][0]
+    again = server.draw(task="generate", prompt=instead, seconds=1.0, steps=2)
+    assert again["notes"] == []
+
+
+def test_what_happens_between_two_times_is_measured(server: Server) -> None:
+    segments = [{"text": "a person walks forward", "seconds": 3.0}, {"text": "a person sits", "seconds": 2.0}]
+    (result,) = server.draw(task="compose", timeline={"segments": segments})["results"]
+    place = f"/motions/{result['id']}/deeds"
+    status, first = server.json("GET", f"{place}?begin=0&end=3")
+    assert (status, first["happened"][0]["seconds"]) == (200, 3.0)
+    assert "forward" in first["happened"][0]["sentence"]
+    assert server.json("GET", place) == (200, {"happened": result["happened"]})
+    assert server.json("GET", f"{place}?begin=4.9&end=5") == (200, {"happened": [None]})
+    for wrong in ("begin=x", "begin=3&end=2", "end=99", "begin=-1", "end=nan"):
+        status, answer = server.json("GET", f"{place}?{wrong}")
+        assert status == 400
+        assert "from 0 to 5" in answer["error"]
 
 
 def test_the_best_of_several_is_that_of_the_library(server: Server) -> None:
@@ -115,6 +143,39 @@ def test_compose_follows_the_path_of_its_timeline(server: Server) -> None:
     assert (result["seed"], result["frames"]) == (4, 80)
     assert result["measures"]["goals"]["path"]["mean_cm"] < 3
     assert np.abs(poses(server, result["id"])[-1, 0, [0, 2]] - [0, 2]).max() < 0.1
+
+
+def _three(*words: str) -> dict[str, Any]:
+    return {"segments": [{"text": text, "seconds": 2.0} for text in words], "seed": 4}
+
+
+def test_a_changed_block_is_drawn_again_and_the_others_keep_their_frames(server: Server) -> None:
+    first, other = _three("a person walks", "a person waves", "a person jumps"), "a person kicks"
+    old = _made(server.draw(task="compose", timeline=first, steps=6))
+    changed = _three("a person walks", "a person waves", other)
+    job = server.submit(task="compose", timeline=changed, steps=6, kept_from=old, levels=2)
+    events = list(server.events(job))
+    levels = [data for _, kind, data in events if kind == "level"]
+    assert [(data["level"], data["begin"], data["frames"]) for data in levels] == [(n, 3.5, 50) for n in (2, 4, 6)]
+    (result,) = events[-1][2]["results"]
+    assert (result["frames"], result["measures"]["redrawn"]) == (120, [2])
+    assert np.array_equal(poses(server, result["id"])[:70], poses(server, old)[:70])
+    assert np.abs(poses(server, result["id"])[80:] - poses(server, old)[80:]).max() > 0.05
+    again = server.draw(task="compose", timeline=changed, steps=6, kept_from=result["id"])["results"][0]
+    assert again["measures"]["redrawn"] == []
+    assert np.array_equal(poses(server, again["id"]), poses(server, result["id"]))
+
+
+def test_where_no_block_is_the_same_all_is_drawn_as_without_an_old_motion(server: Server, walk: str) -> None:
+    timeline = _three("a person walks", "a person waves")
+    plain = _made(server.draw(task="compose", timeline=timeline, steps=6))
+    seed = _made(server.draw(task="compose", timeline=timeline, steps=6, seed=5))
+    for kept in (walk, seed):
+        (result,) = server.draw(task="compose", timeline=timeline, steps=6, kept_from=kept)["results"]
+        assert "redrawn" not in result["measures"]
+        assert np.array_equal(poses(server, result["id"]), poses(server, plain))
+    status, _ = server.json("POST", "/jobs", {"task": "compose", "timeline": timeline, "kept_from": "0" * 16})
+    assert status == 404
 
 
 def test_control_measures_each_goal_and_names_what_is_missed(server: Server) -> None:
@@ -184,6 +245,8 @@ def test_a_switch_has_both_motions_and_what_is_between(server: Server, walk: str
 
 def test_a_duet_has_two_people_and_one_answers_somebody(server: Server, walk: str) -> None:
     (two,) = server.draw(task="duet", prompt="two people dance", seconds=2.0, steps=4)["results"]
+    first, second = (poses(server, two["id"], person) for person in (0, 1))
+    assert two["measures"]["overlaps"] == overlaps(first, second, 20.0)
     assert len([one["sentence"] for one in two["happened"]]) == 2
     (answer,) = server.draw(task="duet", react_to=walk, steps=4)["results"]
     assert (two["people"], answer["people"]) == (2, 2)

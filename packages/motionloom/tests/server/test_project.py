@@ -36,10 +36,13 @@ def segments(name: str, **more: Any) -> dict[str, Any]:
 @pytest.fixture
 def folder(server: Server) -> Iterator[Path]:
     """The server's folder without a project, before the test and behind it."""
-    for old in server.project.glob("project.*"):
-        old.unlink()
+    emptied(server.project)
     yield server.project
-    for old in server.project.glob("project.*"):
+    emptied(server.project)
+
+
+def emptied(folder: Path) -> None:
+    for old in (*folder.glob("project.*"), *folder.glob("projects/*.json")):
         old.unlink()
 
 
@@ -86,8 +89,58 @@ def test_what_is_there_is_replaced_where_the_client_names_it(server: Server, fol
     seen = server.json("GET", "/project/stamp")[1]
     status, answer = put(server, segments("another film", id="other", revision=5), over=seen)
     assert (status, answer["id"], answer["revision"]) == (200, "other", 6)
-    (kept,) = folder.glob("project.2*")
-    assert json.loads(kept.read_bytes())["name"] == "mine"
+    status, rows = server.json("GET", "/projects")
+    assert [(one["id"], one["name"], one.get("open", False)) for one in rows] == [
+        ("other", "another film", True),
+        ("film", "mine", False),
+    ]
+
+
+def test_projects_of_a_folder_are_listed_and_opened_and_none_is_lost(server: Server, folder: Path) -> None:
+    put(server, segments("one", id="film", revision=0))
+    seen = server.json("GET", "/project/stamp")[1]
+    take = {"motion": "0123456789abcdef", "seconds": 2}
+    block = {"text": "a person walks", "seconds": 2.5}
+    put(server, segments("two", id="other", revision=0, segments=[block, block], takes=[take], kept=0), over=seen)
+    assert server.json("POST", "/project/open?id=film") == (200, {"id": "film", "revision": 1})
+    assert server.json("GET", "/project")[1]["name"] == "one"
+    rows = server.json("GET", "/projects")[1]
+    assert [one["id"] for one in rows] == ["film", "other"]
+    assert (rows[1]["words"], rows[1]["blocks"], rows[1]["seconds"]) == (["a person walks"] * 2, 2, 5.0)
+    assert rows[1]["motion"] == take["motion"]
+    assert put(server, segments("late", id="other", revision=1))[0] == 409, "a page that still shows the other one"
+    put(server, segments("one more", id="film", revision=1))
+    assert server.json("POST", "/project/open?id=other")[0] == 200
+    assert server.json("POST", "/project/open?id=film") == (200, {"id": "film", "revision": 2})
+    assert server.json("POST", "/project/open?id=nobody")[0] == 404
+    assert server.json("POST", "/project/open")[0] == 404
+
+
+def test_a_state_of_another_project_that_nobody_has_seen_is_kept(server: Server, folder: Path) -> None:
+    """A page saves a project over another one, while the folder keeps a later state of the first."""
+    put(server, segments("first", id="film", revision=0), "a")
+    put(server, segments("later", id="film", revision=1), "b")
+    put(server, segments("other", id="other", revision=0), "a", over=server.json("GET", "/project/stamp")[1])
+    put(server, segments("mine", id="film", revision=1), "a", over=server.json("GET", "/project/stamp")[1])
+    first, *others = [one["name"] for one in server.json("GET", "/projects")[1]]
+    assert (first, set(others)) == ("mine", {"later", "other"})
+
+
+def test_what_lies_damaged_among_the_projects_is_left_out_and_stays(server: Server, folder: Path) -> None:
+    (folder / "projects").mkdir(exist_ok=True)
+    for number, damage in enumerate((b"", b"{", b"[]", b'{"id": 5}', b'{"id": "film"}')):
+        (folder / "projects" / f"{number}.json").write_bytes(damage)
+    assert server.json("GET", "/projects") == (200, [])
+    assert len(list((folder / "projects").glob("*.json"))) == 5
+
+
+def test_a_sentence_becomes_a_segment_for_each_action(server: Server) -> None:
+    status, found = server.json("POST", "/sentence.json", b"a person walks, turns around and waves")
+    assert status == 200
+    assert [one["text"] for one in found["segments"]] == ["a person walks", "a person turns around", "a person waves"]
+    assert all(1 < one["seconds"] < 10 for one in found["segments"])
+    assert server.json("POST", "/sentence.json", b" ")[0] == 400
+    assert server.json("POST", "/sentence.json", b"\xff")[0] == 400
 
 
 def test_a_project_of_before_there_were_ids_gets_one_that_stays(server: Server, folder: Path) -> None:

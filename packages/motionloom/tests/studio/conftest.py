@@ -48,3 +48,15 @@ def studio(tab: Studio) -> Studio:
     tab.faults.clear()
     tab.open(("a person walks forward", 2.0))
     return tab
+
+
+@pytest.fixture(scope="module")
+def empty(all_there: None, browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
+    """A page on a folder in which nothing was ever saved, just opened."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True, color_scheme="light")
+    with started.server(tmp_path_factory.mktemp("empty")) as server:
+        studio = Studio(context.new_page(), server)
+        studio.page.goto(server.page)
+        studio.page.wait_for_selector("body[data-ready]")
+        yield studio
+        context.close()

@@ -140,9 +140,10 @@ class Studio:
 
     def export(self, name: str) -> bytes:
         """The file that an entry of the export menu gives, by mouse."""
-        self.page.locator(".menu summary").click()
+        menu = self.page.locator(".menu[data-key=Export]")
+        menu.locator("summary").click()
         with self.page.expect_download() as file:
-            self.page.locator(".sheet .row").filter(has=self.page.get_by_text(name, exact=True)).click()
+            menu.locator(".row").filter(has=self.page.get_by_text(name, exact=True)).click()
         return Path(file.value.path()).read_bytes()
 
     # -- what came of it

@@ -97,6 +97,100 @@ def test_own_characters_are_on_the_stage_and_in_the_exports(studio: Studio, tmp_
     assert not studio.faults
 
 
+def drawn_by_draco(hero: Hero) -> Hero:
+    """The same mesh as a Draco bitstream (2.2, sequential, its numbers as they are), and nowhere else in the file."""
+    (primitive,) = hero.json["meshes"][0]["primitives"]
+    accessors, views = hero.json["accessors"], hero.json["bufferViews"]
+
+    def taken(number: int) -> bytes:
+        view = views[accessors[number].pop("bufferView")]
+        found = bytes(hero.data[view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
+        hero.data[view["byteOffset"] : view["byteOffset"] + view["byteLength"]] = bytes(view["byteLength"])
+        return found
+
+    def varint(number: int) -> bytes:
+        low, rest = number & 127, number >> 7
+        return bytes([low | 128]) + varint(rest) if rest else bytes([low])
+
+    names = {"POSITION": (0, 9, 3), "JOINTS_0": (4, 2, 4), "WEIGHTS_0": (4, 9, 4)}  # kind, type of number, width
+    corners = accessors[primitive["attributes"]["POSITION"]]["count"]
+    faces = np.frombuffer(taken(primitive["indices"]), "<u2")
+    data = b"DRACO" + bytes([2, 2, 1, 0, 0, 0]) + varint(len(faces) // 3) + varint(corners) + b"\1"
+    data += faces.astype("<u1" if corners < 256 else "<u2").tobytes() + b"\1" + varint(len(names))
+    data += b"".join(bytes([*about, 0]) + varint(number) for number, about in enumerate(names.values()))
+    data += bytes(len(names)) + b"".join(taken(primitive["attributes"][name]) for name in names)
+    packed = hero.add(np.frombuffer(data, np.uint8), 5121, "SCALAR")
+    view = accessors.pop(packed)["bufferView"]
+    attributes = {name: number for number, name in enumerate(names)}
+    primitive["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": view, "attributes": attributes}}
+    hero.json["extensionsUsed"] = hero.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    return hero
+
+
+def test_a_character_packed_by_draco_is_on_the_stage(studio: Studio, tmp_path: Path):
+    mannequin = studio.picture()
+    pictures = []
+    for hero in (Hero(seed=7), drawn_by_draco(Hero(seed=7))):
+        file = hero.write(tmp_path / "hero.glb")
+        studio.drop(file)
+        studio.page.wait_for_selector("#canvas[data-character], .notice[role=alert]")
+        assert studio.page.locator(".notice[role=alert]").count() == 0
+        pictures.append(studio.picture())
+        studio.key("Control+z")
+    plain, packed = pictures
+    assert (np.abs(packed - mannequin).max(axis=-1) > 30).mean() > 0.003, "the stage shows the mannequin"
+    assert (np.abs(packed - plain).max(axis=-1) > 30).mean() < 0.002, "it looks as the plain file does"
+    assert not studio.faults
+
+
+def test_a_refused_character_is_used_once_its_joints_are_named(studio: Studio, tmp_path: Path):
+    """Its names say nothing and a hand hangs at the hip: a dialog asks, with guesses, and the answer stays."""
+    page, hero = studio.page, Hero(seed=4)
+    names = {node["name"]: f"part {number}" for number, node in enumerate(hero.json["nodes"][:22])}
+    for node in hero.json["nodes"][:22]:
+        node["name"] = names[node["name"]]
+    hero.json["nodes"][19]["children"] = []
+    hero.json["nodes"][0]["children"].append(21)
+    studio.drop(hero.write(tmp_path / "odd.glb"))
+    page.wait_for_selector("#joints[open]")
+    assert page.locator("#joints .part").count() == 22
+    assert page.locator("#joints .part.missing").count() > 0
+    page.get_by_role("button", name="Use these joints").click()
+    studio.says(page.locator("#joints [role=alert]"), "no joint was found for")
+    pixels = "document.querySelector('#joints canvas').toDataURL()"
+    before = page.evaluate(pixels)
+    studio.until(f"{pixels} !== {json.dumps(before)}")  # it turns
+    for part, name in names.items():
+        page.locator(f"#joints .part[data-key={part}] select").select_option(name)
+    assert page.locator("#joints .part.missing").count() == 0
+    page.get_by_role("button", name="Use these joints").click()
+    page.wait_for_selector("#joints", state="hidden")
+    page.wait_for_selector("#canvas[data-character]")
+    moving = tmp_path / "moving.glb"
+    moving.write_bytes(studio.export("GLB"))
+    assert load_character(moving, joint_map=names).joints.names()["left_wrist"] == {names["left_wrist"]: 1.0}
+    studio.load()
+    page.wait_for_selector("#canvas[data-character]")
+    studio.key("Control+z")
+    assert not studio.faults
+
+
+def test_pictures_that_nothing_unpacks_are_refused_in_a_sentence(studio: Studio, tmp_path: Path):
+    hero = Hero(seed=2)
+    hero.json["extensionsUsed"] = ["KHR_texture_basisu"]
+    studio.drop(hero.write(tmp_path / "hero.glb"))
+    said = studio.page.locator(".notice[role=alert]")
+    studio.says(said, "hero.glb cannot be shown: its pictures are packed (KHR_texture_basisu)")
+    studio.key("Control+z", "Escape")
+    hero = Hero(seed=2)
+    (primitive,) = hero.json["meshes"][0]["primitives"]
+    primitive["mode"] = 77
+    studio.drop(hero.write(tmp_path / "odd.glb"))
+    studio.says(said, "odd.glb cannot be shown")
+    assert "THREE" not in said.inner_text()
+    studio.key("Control+z")
+
+
 class Listener(BaseHTTPRequestHandler):
     """Somebody else's server, who wants to know when a character is looked at."""
 
@@ -152,10 +246,11 @@ def test_a_skeleton_and_its_recording_become_a_clip(studio: Studio, tmp_path: Pa
 
 
 def test_other_peoples_characters_are_on_the_stage(studio: Studio):
-    for name in ("vrm1_example.vrm", "gdbot.glb"):
+    for name in ("vrm1_example.vrm", "gdbot.glb", "vroid.vrm"):
         studio.drop(shared(f"rigs/{name}"))
         studio.page.wait_for_selector(f"#inspector b:text-is('{name}')")
-        studio.page.wait_for_selector("#canvas[data-character]")
+        studio.page.wait_for_selector("#canvas[data-character], .notice[role=alert]")
+        assert studio.page.locator(".notice[role=alert]").count() == 0
         data = studio.export("GLB")
         (length,) = struct.unpack_from("<I", data, 12)
         assert json.loads(data[20 : 20 + length])["skins"]

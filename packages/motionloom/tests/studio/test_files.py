@@ -54,7 +54,7 @@ def test_a_motion_is_shared_as_a_page(studio: Studio, browser, tmp_path: Path):
 
 def test_the_export_menu_stays_open_while_the_page_changes_behind_it(studio: Studio):
     page, focused = studio.page, "document.activeElement.textContent"
-    menu = page.locator(".menu")
+    menu = page.locator(".menu[data-key=Export]")
     old = studio.project()["takes"][0]["motion"]
     studio.key("r")
     menu.locator("summary").focus()

@@ -18,7 +18,7 @@ def test_one_of_two_walks_a_path_and_only_the_second_is_drawn_for_new_words(stud
     assert studio.motion().shape[1] == 80
     box = studio.page.locator(".content .ruler").bounding_box()
     studio.drag((box["x"] + 2, box["y"] + 12), (box["x"] + 2 * 84, box["y"] + 12), hold="Shift")
-    studio.key("f")
+    studio.key("z")
     both = studio.motion()
     studio.page.mouse.dblclick(*studio.middle(".track.other .block", 1))
     studio.page.keyboard.type("a person jumps")

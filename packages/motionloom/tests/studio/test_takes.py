@@ -35,14 +35,14 @@ def test_a_frozen_stretch_stays_and_the_rest_is_drawn(studio: Studio):
     box = studio.page.locator(".content .ruler").bounding_box()
     left, y = box["x"], box["y"] + 12
     studio.drag((left + 2, y), (left + 3 * 84, y), hold="Shift")
-    studio.key("f", "r")
+    studio.key("z", "r")
     project = studio.project()
     assert project["frozen"] == [[0, 3]]
     assert project["takes"][0]["how"] == "redrawn"
     after = studio.motion(project)
     assert np.abs(after[0, :55] - before[0, :55]).max() < 0.02
     assert np.abs(after[0, 75:] - before[0, 75:]).max() > 0.05
-    studio.key("Shift+F")
+    studio.key("Shift+Z")
     assert studio.project()["frozen"] == []
 
 
@@ -52,7 +52,7 @@ def test_a_stretch_that_is_frozen_during_a_draw_is_of_the_motion_that_comes_of_i
     box = studio.page.locator(".content .ruler").bounding_box()
     left, y = box["x"], box["y"] + 12
     studio.drag((left + 2, y), (left + 3 * 84, y), hold="Shift")
-    studio.key("r", "f")
+    studio.key("r", "z")
     studio.page.wait_for_selector(".frozen")
     project = studio.project()
     assert project["base"]["motion"] != old
@@ -82,6 +82,23 @@ def test_a_loop_closes(studio: Studio):
     first, last = person[0] - person[0, :1], person[-1] - person[-1, :1]
     assert studio.project()["takes"][0]["how"] == "looped"
     assert np.linalg.norm(first - last, axis=-1).mean() < 0.15
+
+
+def test_bodies_that_are_in_each_other_are_red_on_the_ruler(studio: Studio):
+    studio.open(("two people stand", 3), people=2)
+    project = studio.project()
+    overlaps = [{"begin": 1.0, "end": 1.5, "depth": 0.06}]
+    studio.put({**project, "takes": [{**project["takes"][0], "overlaps": overlaps}]})
+    studio.load()
+    assert studio.page.locator(".ruler .overlap").get_attribute("title") == "The two are in each other by up to 6 cm"
+    studio.says(studio.page.locator("#inspector"), "up to 6 cm")
+    tags = studio.page.locator("#stage .tag")
+    assert tags.all_inner_texts() == ["two people stand"] * 2
+    assert tags.first.bounding_box() != tags.last.bounding_box()
+    assert [one.get_attribute("class") for one in studio.page.locator(".labels .asked").all()][:2] == [
+        "asked who0",
+        "asked who1",
+    ]
 
 
 def test_two_people_from_words(studio: Studio):

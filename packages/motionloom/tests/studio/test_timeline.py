@@ -101,11 +101,45 @@ def test_keys_are_listed_and_the_theme_changes(studio: Studio, scheme: str):
     assert not studio.page.locator("#help").is_visible()
 
 
-def test_an_empty_block_says_what_is_missing(studio: Studio):
+def test_a_changed_block_is_drawn_alone_and_the_others_keep_their_frames(studio: Studio):
+    studio.open(("a person walks forward", 3), ("a person waves with the right hand", 3), ("a person sits", 2))
+    before = studio.motion()
+    studio.page.mouse.dblclick(*studio.middle(".track.words .block", 2))
+    studio.page.keyboard.type("a person jumps")
+    studio.key("Enter")
+    project = studio.project()
+    after = studio.motion(project)
+    assert project["takes"][0]["how"] == "changed"
+    assert np.array_equal(after[0, :110], before[0, :110])
+    assert np.abs(after[0, 120:] - before[0, 120:]).max() > 0.1
+    studio.key("Shift+R")
+    whole = studio.project()
+    assert whole["takes"][0]["how"] == "drawn"
+    assert not np.array_equal(studio.motion(whole)[0, :110], before[0, :110])
+
+
+def test_a_block_says_what_happens_in_it_and_what_is_known_instead_of_its_words(studio: Studio):
+    studio.open(("a person walks forward", 3), ("vacuuming the living room", 3))
+    assert studio.page.locator(".block .noted").count() == 1
+    studio.page.mouse.move(*studio.middle(".track.words .block", 0))
+    studio.says(studio.page.locator(".tip"), "forward")
+    studio.page.locator(".track.words .block").nth(1).focus()
+    studio.says(studio.page.locator(".remark"), "seen nothing like 'vacuuming the living room'")
+    instead = studio.page.locator(".remark button").first
+    words = instead.inner_text()
+    instead.click()
+    project = studio.project()
+    assert project["segments"][1]["text"] == words
+    assert studio.page.locator(".block .noted, .remark").count() == 0
+
+
+def test_somebody_stands_in_an_empty_block_and_the_others_are_drawn(studio: Studio):
+    before = studio.project()["takes"][0]
     studio.key("a", "Enter")
-    said = studio.page.locator(".track.words .said")
-    studio.says(said, "has no words yet")
-    assert studio.page.locator(".block.wrong").count() == 1
+    studio.drawn()
+    assert studio.project()["takes"][0]["seconds"] == pytest.approx(before["seconds"] + 3)
+    studio.says(studio.page.locator(".track.words .block").last, "stands still")
+    assert studio.page.locator(".block.wrong, .track.words .said").count() == 0
 
 
 def test_the_sheet_of_keys_fits_the_window_and_no_key_covers_its_words(studio: Studio):

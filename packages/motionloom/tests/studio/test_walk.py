@@ -16,7 +16,7 @@ def field(studio: Studio, name: str, value: str) -> None:
     studio.page.keyboard.press("Enter")
 
 
-def test_words_are_drawn_half_a_second_after_the_last_letter(studio: Studio):
+def test_words_are_drawn_soon_after_the_last_letter(studio: Studio):
     before = studio.project()["takes"][0]["motion"]
     studio.page.mouse.dblclick(*studio.middle(".track.words .block"))
     studio.page.keyboard.type("a person jumps")

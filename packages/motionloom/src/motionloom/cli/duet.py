@@ -336,7 +336,7 @@ def _remarks_on_words(prior: "Prior", block: "PairBlock", texts: list[str]) -> l
     """
     from motionloom.goals.remarks import remarks_on_two
 
-    return _printed(remarks_on_two(texts, block.known, prior.known, prior.text))
+    return _printed([one.line for one in remarks_on_two(texts, block.known, prior.known, prior.text)])
 
 
 def _printed(lines: list[str]) -> list[str]:

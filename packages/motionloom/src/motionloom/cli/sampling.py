@@ -214,7 +214,7 @@ def unknown_words(prior: "Prior", prompts: Sequence[str]) -> dict[str, str]:
     """The prompts that `remark_unknown` has a line for, with the line."""
     from motionloom.goals.remarks import remarks_on
 
-    remarks = remarks_on(prompts, prior.known, prior.text)
+    remarks = {one.text: one.line for one in remarks_on(prompts, prior.known, prior.text)}
     for line in remarks.values():
         print(f"motionloom: {line}", file=sys.stderr)
     return remarks

@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from motionloom.motion import Motion
 
-DEEP = 0.02
-"""Metres of overlap that are no touch any more: skin and cloth give way as much."""
-
 
 def two_body_measures(duet: "Sequence[Motion]") -> dict[str, float]:
     """How near the two bodies and their hands come, and how deep and in how many frames they are in each other."""
-    from motionloom.kinematics.capsules import overlap, trunk_distance, wrist_distance
+    from motionloom.kinematics.capsules import DEEP, overlap, trunk_distance, wrist_distance
     from motionloom.retarget import joints22
 
     first, second = (joints22(person) for person in duet)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from motionloom.goals.contact import read_contact
@@ -13,6 +14,17 @@ from motionloom.runtime.text.protocol import TextEncoder
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What is said of some words."""
+
+    text: str
+    line: str
+    instead: tuple[str, ...] = ()
+    """The nearest sentences that are known."""
+
 
 _LIGHT = frozenset(
     map(
@@ -56,39 +68,44 @@ def parts_read(timeline: "Timeline") -> str:
 
 def remarks_on_two(
     texts: Sequence[str], block_known: Known | None, known: Known | None, encoder: TextEncoder
-) -> list[str]:
-    """Lines about the words of two people: who is read to do what, and what neither block nor prior has learned.
+) -> list[Remark]:
+    """Remarks on the words of two people: who is read to do what, and what neither block nor prior has learned.
 
     texts: one per segment. block_known: what the block says that it knows; None: of pairs nothing is said. known: what
     the prior knows. Raises `MotionloomError` as the encoder does.
     """
     asked = {text: prompts_of(text) for text in texts if text.strip()}
-    lines = []
+    remarks = []
     for text, said in asked.items():
         if MARK not in text and said[0] != said[1]:
-            lines.append(f"read as: '{said[0]} {MARK} {said[1]}'")
+            remarks.append(Remark(text, f"read as: '{said[0]} {MARK} {said[1]}'"))
         contact = read_contact(said)
-        lines += [] if contact is None else [f"read as: {contact}"]
+        remarks += [] if contact is None else [Remark(text, f"read as: {contact}")]
     if block_known is not None and asked:
         found = nearest(block_known, [without_two(text) for text in asked], encoder)
-        lines += [f"of two people {one.remark()}" for one in found if not one.near]
-    return lines + list(remarks_on([prompt for said in asked.values() for prompt in said], known, encoder).values())
+        remarks += [
+            Remark(text, f"of two people {one.remark()}", one.sentences)
+            for text, one in zip(asked, found, strict=True)
+            if not one.near
+        ]
+    return remarks + remarks_on([prompt for said in asked.values() for prompt in said], known, encoder)
 
 
-def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> dict[str, str]:
-    """Lines for texts that are not English, and for those that are like nothing in the table of what is known.
+def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> list[Remark]:
+    """Remarks on texts that are not English, and on those that are like nothing in the table of what is known.
 
     known: None where a weight file has no such table. The texts without a remark are left out. Raises `MotionloomError`
     as the encoder does.
     """
     asked = [text for text in dict.fromkeys(texts) if text.strip()]
-    foreign = [text for text in asked if not is_english(text)]
-    remarks = {
-        text: f"{text[:60]!r} does not look like English, and these weights know nothing else" for text in foreign
-    }
-    english = [text for text in asked if text not in remarks]
+    english = [text for text in asked if is_english(text)]
+    remarks = [
+        Remark(text, f"{text[:60]!r} does not look like English, and these weights know nothing else")
+        for text in asked
+        if text not in english
+    ]
     found = looked_up(english, known, encoder) if known else []
-    return remarks | {one.prompt: one.remark() for one in found if not one.near}
+    return remarks + [Remark(one.prompt, one.remark(), one.sentences) for one in found if not one.near]
 
 
 def looked_up(texts: Sequence[str], known: Known, encoder: TextEncoder) -> list[Nearest]:

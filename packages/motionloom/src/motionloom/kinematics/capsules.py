@@ -5,8 +5,11 @@ Places are metres, +Y up, in one world.
 
 import numpy as np
 
+from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.physics import WRISTS, Array, J
 
+DEEP = 0.02
+"""Metres of overlap that are no touch any more: skin and cloth give way as much."""
 TOGETHER = 400
 """Frames that are measured at once: memory does not grow with the length."""
 _HEIGHT = 1.6038
@@ -112,6 +115,18 @@ def overlap(first: np.ndarray, second: np.ndarray) -> Array:
         a, b = (each[start : start + TOGETHER] for each in ends)
         depth[start : start + TOGETHER] = -gaps(a, RADII, b, RADII).min(axis=(1, 2))
     return np.maximum(depth, 0.0)
+
+
+def overlaps(first: np.ndarray, second: np.ndarray, fps: float) -> list[dict[str, float]]:
+    """The stretches in which one body is in the other: ``begin`` and ``end`` in seconds, ``depth`` in metres.
+
+    Shapes as of `overlap`; what is no deeper than `DEEP` is a touch.
+    """
+    depth = overlap(first, second)
+    return [
+        {"begin": round(start / fps, 3), "end": round(stop / fps, 3), "depth": round(float(depth[start:stop].max()), 3)}
+        for start, stop in true_spans(depth > DEEP)
+    ]
 
 
 def trunk_distance(first: np.ndarray, second: np.ndarray) -> Array:

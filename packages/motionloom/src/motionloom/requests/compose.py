@@ -15,6 +15,7 @@ class Compose(Finish, Adapted):
     """
 
     timeline: Any = declare("timeline", "what a timeline file holds", needed=True)
+    kept_from: Any = declare("motion", "a motion of an earlier timeline; blocks that ask for the same keep its frames")
     seed: int | None = like(Sampling, "seed", "the same seed makes the same motion: 0, or the timeline's", default=None)
     guidance: float | None = like(
         Sampling, "guidance", "strength of the text where a segment has none of its own: 2.5", default=None

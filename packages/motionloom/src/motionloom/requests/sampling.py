@@ -119,6 +119,10 @@ class Sampling(Checked):
             raise MotionloomError(f"one person has one seed; got {self.seed}")
         return [self.seed + self.first + number for number in range(count)]
 
+    def each(self) -> "list[Self]":
+        """For each motion how it is sampled alone, so that it becomes the same."""
+        return [replace(self, count=1, first=self.first + number) for number in range(self.number())]
+
     def number(self, usual: int = 1) -> int:
         """How many motions to make."""
         return self.count or usual

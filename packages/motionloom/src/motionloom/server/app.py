@@ -37,7 +37,7 @@ from motionloom.server.refusal import Refusal, full_disk
 from motionloom.server.saved import Saved
 from motionloom.server.saved import routes as project_routes
 from motionloom.server.streaming import EventStream, Streams
-from motionloom.server.timelines import timeline_json, timeline_yaml
+from motionloom.server.timelines import sentence_json, timeline_json, timeline_yaml
 from motionloom.server.worker import Worker
 from motionloom.skeleton import SMPL22
 
@@ -97,11 +97,13 @@ def routes(*, page: bool = True) -> list[BaseRoute]:
         Route("/jobs/{id}/events", job_events),
         Route("/motions", upload_motion, methods=["POST"]),
         Route("/motions/{name}", motion),
+        Route("/motions/{id}/deeds", deeds),
         Route("/characters", upload_character, methods=["POST"]),
         Route("/characters/{id}", character),
         *project_routes(),
         Route("/timeline.yaml", timeline_to_yaml, methods=["POST"]),
         Route("/timeline.json", timeline_to_json, methods=["POST"]),
+        Route("/sentence.json", sentence_to_json, methods=["POST"]),
         *mmcp_routes(),
         Route("/openapi.json", openapi),
         Route("/docs", docs),
@@ -213,6 +215,10 @@ async def motion(request: Request) -> Response:
     studio = studio_of(request)
     name, dot, kind = request.path_params["name"].partition(".")
     stored = await run_in_threadpool(studio.project.motion, name)
+    if not dot and "application/octet-stream" in request.headers.get("accept", ""):
+        places = await run_in_threadpool(files.places, stored)
+        headers = {"Motion-Fps": f"{stored.people[0].fps:g}", "Motion-People": str(len(stored.people))}
+        return Response(places, media_type="application/octet-stream", headers=headers)
     if not dot:
         about = await run_in_threadpool(files.as_json, stored, lambda a: base64.b64encode(files.float32(a)).decode())
         return JSONResponse(about)
@@ -224,12 +230,21 @@ async def motion(request: Request) -> Response:
     return file_once(part, media_type=files.FORMATS[kind], name=f"motion-{name[:8]}{part.suffix}")
 
 
-async def upload_character(request: Request) -> Response:
+async def deeds(request: Request) -> Response:
     from motionloom.server import files
 
-    studio = studio_of(request)
-    async with file_of(request, studio.project, files.SUFFIXES, studio.limits) as (part, name):
-        about = await _with_file(studio, lambda: files.read_character(studio.project, part, name), part, name)
+    stored = await run_in_threadpool(studio_of(request).project.motion, request.path_params["id"])
+    asked = request.query_params
+    found = await run_in_threadpool(files.deeds_between, stored, asked.get("begin"), asked.get("end"))
+    return JSONResponse({"happened": found})
+
+
+async def upload_character(request: Request) -> Response:
+    from motionloom.server.characters import SUFFIXES, read_character
+
+    studio, joints = studio_of(request), request.query_params.get("joints")
+    async with file_of(request, studio.project, SUFFIXES, studio.limits) as (part, name):
+        about = await _with_file(studio, lambda: read_character(studio.project, part, name, joints), part, name)
     return JSONResponse(about, status_code=201)
 
 
@@ -260,12 +275,21 @@ async def timeline_to_yaml(request: Request) -> Response:
 
 async def timeline_to_json(request: Request) -> Response:
     studio = studio_of(request)
-    body = await body_of(request, studio.limits.body_bytes)
-    try:
-        text = body.decode("utf-8")
-    except UnicodeDecodeError:
-        raise MotionloomError("the timeline is not UTF-8 text; save it as UTF-8") from None
+    text = await _text_of(request, "timeline")
     return JSONResponse(await run_in_threadpool(timeline_json, text, studio.project, studio.limits))
+
+
+async def sentence_to_json(request: Request) -> Response:
+    text = await _text_of(request, "sentence")
+    return JSONResponse(await run_in_threadpool(sentence_json, text, studio_of(request).limits))
+
+
+async def _text_of(request: Request, what: str) -> str:
+    body = await body_of(request, studio_of(request).limits.body_bytes)
+    try:
+        return body.decode("utf-8")
+    except UnicodeDecodeError:
+        raise MotionloomError(f"the {what} is not UTF-8 text; save it as UTF-8") from None
 
 
 # What goes wrong

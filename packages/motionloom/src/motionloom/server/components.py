@@ -133,8 +133,15 @@ def _jobs() -> dict[str, Schema]:
             "error": {"anyOf": [TEXT, _NULL]},
             "status": {"anyOf": [WHOLE, _NULL], "description": "of the error, as an answer would have it"},
             "remarks": _list(TEXT, description="how the words were read, and which of them nobody learned"),
+            "notes": _list(ref("Note"), description="the same, each with the words that it is about"),
             "results": _list(ref("Result")),
         }
+    )
+    note = _object(
+        {"text": TEXT, "line": TEXT, "instead": _list(TEXT, description="the nearest sentences that are known")},
+        "text",
+        "line",
+        "instead",
     )
     return {
         "Task": {"enum": list(TASKS)},
@@ -145,6 +152,8 @@ def _jobs() -> dict[str, Schema]:
         "Contacts": {"type": "object", "additionalProperties": _number(), "description": "shares of the time"},
         "Result": result,
         "Job": job,
+        "Note": note,
+        "Happened": _object({"happened": _list({"anyOf": [ref("Deeds"), _NULL]})}, "happened"),
         "NewJob": _object({"id": ID}, "id"),
     }
 

@@ -62,6 +62,7 @@ def plan_of(request: JobRequest) -> Plan:
         people=tuple(people),
         target=target,
         taught=request.taught,
+        kept=request.kept,
     )
 
 

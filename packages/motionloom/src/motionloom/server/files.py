@@ -8,18 +8,20 @@ from typing import Any, cast
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.formats import characters, readable
+from motionloom.formats import readable
 from motionloom.goals.fields import Field
-from motionloom.io import load, load_scene, open_character, save, save_scene
+from motionloom.io import load, load_scene, save, save_scene
 from motionloom.io.text import parse_json
+from motionloom.kinematics.deeds import happened
 from motionloom.motion import Motion
 from motionloom.requests.export import Export
-from motionloom.retarget import RootMode, joint_map, retarget, to_smpl22
+from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.stand import HERE, started
 from motionloom.retarget.toes import bend_toes
+from motionloom.server.characters import loaded
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
@@ -36,15 +38,13 @@ FORMATS = {
 }
 ONE_PERSON = ("bvh", "npz")
 UPLOADS = (*(suffix for suffix in readable() if suffix not in (".gltf", ".vrma")), ".json")
-SUFFIXES = (*characters(alone=True), ".bvh")
-"""Of characters."""
 
 
 def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
     """A motion for a page: everybody as the 22-joint person; ``encode`` makes text of an array of float32."""
     people = []
     for person in stored.people:
-        uniform = person if person.skeleton == SMPL22 else to_smpl22(person)
+        uniform = _uniform(person)
         people.append(
             {
                 "positions": encode(uniform.positions()),
@@ -55,6 +55,27 @@ def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
     first = stored.people[0]
     about = {"id": stored.id, "fps": first.fps, "frames": len(first), "seconds": round(first.seconds, 4)}
     return about | {"people": people, "about": stored.about}
+
+
+def places(stored: Stored) -> bytes:
+    """Where the 22 joints of everybody are: (people, frames, 22, 3) metres, little-endian float32."""
+    return b"".join(float32(_uniform(person).positions()) for person in stored.people)
+
+
+def deeds_between(stored: Stored, begin: str | None, end: str | None) -> list[dict[str, Any] | None]:
+    """What everybody does between two seconds, by default in all of it; raises `Refusal` 400 for no such stretch."""
+    length = stored.people[0].seconds
+    try:
+        since, until = float(begin or 0), length if end is None else float(end)
+    except ValueError:
+        since = until = -1.0
+    if not 0 <= since < until <= length + 1e-3:
+        raise Refusal(400, f"'begin' and 'end' are seconds from 0 to {length:g}, the end behind the begin")
+    return happened(one.crop(since, min(until, one.seconds)) for one in stored.people)
+
+
+def _uniform(person: Motion) -> Motion:
+    return person if person.skeleton == SMPL22 else to_smpl22(person)
 
 
 def from_json(part: Path, name: str) -> list[Motion]:
@@ -133,18 +154,13 @@ def _put(motion: Motion, skeleton: Skeleton, asked: Export) -> Motion:
 
 def _on_character(project: Project, people: Sequence[Motion], skeleton: str, caption: str, asked: Export) -> Path:
     path, _ = project.character(skeleton)
-    kind, suffix, character = asked.format, path.suffix, None
-    if suffix == ".bvh":
-        from motionloom.io.bvh import read_bvh
-
-        target = read_bvh(path).motion.skeleton
-    elif suffix == ".asf":
+    kind = asked.format
+    suffix = path.suffix
+    if suffix == ".asf":
         raise MotionloomError("an ASF skeleton belongs to AMC files; put motions on a .glb, .vrm, .gltf or .bvh")
-    else:
-        character = open_character(path)
-        target = character.skeleton
-        if kind == "glb" and len(people) > 1:
-            raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
+    target, character = loaded(path, project.named_joints(skeleton))
+    if character is not None and kind == "glb" and len(people) > 1:
+        raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
     body = read_body(target)
     moved = [bend_toes(_put(one, target, asked), body) for one in people]
     if character is not None and character.stand != HERE and len(moved) == 1 and asked.at != "origin":
@@ -184,21 +200,6 @@ def read_upload(project: Project, part: Path, name: str, *, asf: str | None, lim
             )
         to_smpl22(motion.frames(0, 1))  # a body of which the 22 joints are not found helps nobody later
     return project.add(people, {"task": "upload", "name": name})
-
-
-def read_character(project: Project, part: Path, name: str) -> dict[str, Any]:
-    """A character's file that arrived as ``part``, into the project: its id and which of its joints are which."""
-    suffix = part.suffix
-    if suffix not in SUFFIXES:
-        raise MotionloomError(f"{name} is no character: its name must end in {', '.join(SUFFIXES)}")
-    if suffix == ".bvh":
-        from motionloom.io.bvh import read_bvh
-
-        joints = joint_map(read_bvh(part).motion.skeleton)
-    else:
-        joints = open_character(part).joints
-    found = {joint: list(points) for joint, points in joints.names().items()}
-    return {"id": project.add_character(part, name, suffix), "name": name, "joints": found}
 
 
 def read_skeleton(project: Project, part: Path, name: str) -> dict[str, Any]:

@@ -22,6 +22,8 @@ from motionloom.server.timelines import timeline_from_json
 
 if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
+    from motionloom.motion import Motion
+    from motionloom.tasks.redraw import Block
 
 TASKS = tuple(REQUESTS)
 LEVELS = Spec("whole", "send the poses as events after so many network calls, or after every one", low=1)
@@ -54,6 +56,8 @@ class JobRequest:
     """What is switched to."""
     taught: tuple[Applied, ...] = ()
     """Adapters of the prior for this job."""
+    kept: "tuple[Motion, list[Block]] | None" = None
+    """A motion of an earlier timeline and what it was sampled from."""
     call: "Callable[[Any, Callable[[int, int], None]], Iterator[Any]] | None" = None
     """Draws instead of the task: (models, progress) -> results to keep."""
 
@@ -144,7 +148,7 @@ class _Reader:
         timeline = timeline_from_json(self.given["timeline"], self.project, self.limits)
         found = replace(found, sampling=settled(found.values, timeline, but=self.given))
         parts = () if timeline.path is None else (("path", timeline.path),)
-        return replace(found, timeline=timeline, goal=timeline.path, parts=parts)
+        return replace(found, timeline=timeline, goal=timeline.path, parts=parts, kept=self.kept(timeline, found))
 
     def control(self, found: JobRequest) -> JobRequest:
         if "timeline" in self.given:
@@ -214,6 +218,17 @@ class _Reader:
         if person >= len(motion.people):
             raise MotionloomError(f"the motion has {len(motion.people)} people, counted from 0; got person {person}")
         return motion
+
+    def kept(self, timeline: Timeline, found: JobRequest) -> "tuple[Motion, list[Block]] | None":
+        """What blocks may keep of an earlier motion; what goes on from elsewhere, or is a loop, is all sampled."""
+        from motionloom.tasks.redraw import blocks_from
+
+        if "kept_from" not in self.given:
+            return None
+        motion = self.motion("kept_from")
+        blocks = blocks_from(motion.about.get("blocks"), len(motion.people[0]))
+        free = timeline.start is None and not found.values.loop and len(motion.people) == 1
+        return (motion.people[0], blocks) if free and blocks else None
 
     # -- goals
 

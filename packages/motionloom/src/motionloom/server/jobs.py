@@ -12,11 +12,12 @@ import threading
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from motionloom.goals.remarks import Remark
 from motionloom.server.job_request import JobRequest
 
 FINAL = ("done", "failed", "cancelled")
@@ -49,7 +50,7 @@ class Job:
     status: int | None = None
     """The HTTP status that an error of a request has for the same reason, such as 507 for a full disk."""
     error: str | None = None
-    remarks: list[str] = field(default_factory=list)
+    remarks: list[Remark] = field(default_factory=list)
     """What is to be said of its words."""
     results: list[dict[str, Any]] = field(default_factory=list)
     log_bytes: int = 0
@@ -76,7 +77,8 @@ class Job:
                 "progress": round(min(share, 1.0), 4),
                 "status": self.status,
                 "error": self.error,
-                "remarks": list(self.remarks),
+                "remarks": [one.line for one in self.remarks],
+                "notes": [asdict(one) for one in self.remarks],
                 "results": list(self.results),
             }
 

@@ -74,8 +74,10 @@ def _about_jobs() -> dict[str, dict[str, dict[str, Any]]]:
 def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
     name, asf = _with("name", "the file's name; only its ending counts"), _with("asf", "id of the ASF of an AMC", ID)
     required = name | {"required": True}
+    named = _with("joints", "JSON of joints by their meaning, where the file's names do not say it")
     one, character = _with("id", "of the motion", ID, place="path"), _with("id", "of the character", ID, place="path")
     kind = _with("format", "of the file", ref("MotionFormat"), place="path")
+    stretch = tuple(_with(name, "seconds", {"type": "number"}) for name in ("begin", "end"))
     options = [
         _with(name, spec.help, ref(name.title()) if spec.words else schema(spec, {}))
         for name, spec in specs(Export).items()
@@ -93,9 +95,18 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
         "/motions/{id}": {
             "get": _operation(
                 "get_motion",
-                "Places, rotations and root, as base64 of little-endian float32",
+                "Places, rotations and root, as base64 of little-endian float32; "
+                "with 'Accept: application/octet-stream' the places alone, as bytes (docs/server.md)",
                 motion,
                 parameters=(one,),
+            )
+        },
+        "/motions/{id}/deeds": {
+            "get": _operation(
+                "get_deeds",
+                "What everybody does in a stretch of a motion",
+                _answered("measured on the joints; null for less than a quarter of a second", ref("Happened")),
+                parameters=(one, *stretch),
             )
         },
         "/motions/{id}.{format}": {
@@ -105,7 +116,7 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
         },
         "/characters": {
             "post": _operation(
-                "upload_character", "Send a GLB, VRM, glTF or BVH character", body, known, parameters=(required,)
+                "upload_character", "Send a GLB, VRM, glTF or BVH character", body, known, parameters=(required, named)
             )
         },
         "/characters/{id}": {"get": _operation("get_character", "The character's file", file, parameters=(character,))},
@@ -142,12 +153,30 @@ def _about_the_rest() -> dict[str, dict[str, dict[str, Any]]]:
         "/project/aside": {
             "post": _operation("set_project_aside", "Give what was saved another name in the folder", aside)
         },
+        "/project/open": {
+            "post": _operation(
+                "open_project",
+                "Open another project of the folder; the one that was open stays in it",
+                _answered("its id and revision", ANYTHING),
+                parameters=(_with("id", "of the project, as /projects lists it"),),
+            )
+        },
+        "/projects": {
+            "get": _operation(
+                "list_projects", "The projects of the folder, the open one first", _answered("rows", ANYTHING)
+            )
+        },
         "/timeline.yaml": {
             "post": _operation("timeline_to_yaml", "A timeline's JSON to its YAML", _asked(ref("Timeline")), text)
         },
         "/timeline.json": {
             "post": _operation(
                 "timeline_to_json", "A timeline's YAML, in UTF-8, to its JSON", _asked(FILE, BYTES), timeline
+            )
+        },
+        "/sentence.json": {
+            "post": _operation(
+                "sentence_to_json", "A sentence to a timeline, a segment for each action", _asked(FILE, BYTES), timeline
             )
         },
     }

@@ -2,10 +2,11 @@
 
     project.json            what the page saves
     project.DAY-TIME.json   what was there before and was put aside, since the page could not read it
+    projects/NAME.json      another project, as it was saved last (`shelf.py`)
     motions/ID.npz          a motion; ID.2.npz, ID.3.npz, ... are the other people in its world
     motions/ID.json         what is known of it; written last, so that a motion without it is not there
     characters/ID.glb       a character (.glb, .gltf, .vrm, .bvh) or the skeleton of AMC files (.asf)
-    characters/ID.json      its name
+    characters/ID.json      its name, and its joints where somebody named them
     temporary/              files on their way in or out; emptied at the start
     exports/                files that an assistant asked for
     lock                    held by the one server that has the folder open
@@ -21,7 +22,7 @@ import shutil
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +34,7 @@ from motionloom.io.atomic import atomic_path
 from motionloom.io.text import parse_json
 from motionloom.server.limits import Limits
 from motionloom.server.refusal import Refusal
+from motionloom.server.shelf import Shelf
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -90,6 +92,7 @@ class Project:
             for place in (self.motions, self.characters, self.temporary, self.adapters):
                 place.mkdir(parents=True, exist_ok=True)
             self._owned = _own(self.folder / "lock")
+            self.shelf = Shelf(self.folder / "projects")
             for left in self.temporary.iterdir():
                 shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
         except OSError as error:
@@ -125,7 +128,7 @@ class Project:
         places = [self.motions / _file(stored.id, number) for number in range(len(stored.people))]
         try:
             for person, place in zip(stored.people, places, strict=True):
-                save_npz(person, place)
+                save_npz(person, place, packed=False)
             self._write(self.motions / f"{stored.id}.json", json.dumps(about).encode())
         except BaseException:
             for place in places:  # all of it or nothing
@@ -181,9 +184,9 @@ class Project:
             self._cache.popitem(last=False)
 
     def _make_room(self, newest: str) -> None:
-        """Remove the oldest motions that the project does not name while there are too many or too much of them."""
+        """Remove the oldest motions that no project names while there are too many or too much of them."""
         while len(self._order) > self.limits.motions or sum(self._sizes.values()) > self.limits.stored_bytes:
-            named = self.read_project() or b""
+            named = (self.read_project() or b"") + self.shelf.data()
             old = next((one for one in self._order if one != newest and one.encode() not in named), None)
             if old is None:
                 return
@@ -195,16 +198,17 @@ class Project:
 
     # -- characters and skeletons
 
-    def add_character(self, part: Path, name: str, suffix: str) -> str:
-        """Take a file that `part` named into the project; gives its id."""
+    def add_character(self, part: Path, name: str, suffix: str, joints: Mapping[str, str] | None = None) -> str:
+        """Take a file that `part` named into the project, with the joints that somebody named; gives its id."""
         with self._lock:
             if sum(1 for _ in self.characters.glob("*.json")) >= self.limits.uploads:
                 raise Refusal(409, f"the project holds {self.limits.uploads} characters already; begin another project")
             found = secrets.token_hex(8)
             place = self.characters / f"{found}{suffix}"
             os.replace(part, place)
+            about = {"name": name, "suffix": suffix, **({"joints": dict(joints)} if joints else {})}
             try:
-                self._write(self.characters / f"{found}.json", json.dumps({"name": name, "suffix": suffix}).encode())
+                self._write(self.characters / f"{found}.json", json.dumps(about).encode())
             except BaseException:
                 place.unlink(missing_ok=True)
                 raise
@@ -222,6 +226,15 @@ class Project:
                 if place.is_file():
                     return place, about["name"]
         raise Refusal(404, "there is no such character; send it first with POST /characters?name=hero.glb")
+
+    def named_joints(self, name: str) -> dict[str, str]:
+        """The joints of a character that somebody named, of the 22 by name."""
+        try:
+            about = parse_json((self.characters / f"{name}.json").read_bytes(), name)
+        except (OSError, MotionloomError):
+            return {}
+        found = about.get("joints", {}) if isinstance(about, dict) else {}
+        return {str(part): str(joint) for part, joint in found.items()} if isinstance(found, dict) else {}
 
     # -- the project's JSON
 

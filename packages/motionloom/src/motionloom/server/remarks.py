@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from motionloom.goals.remarks import numbers_read, parts_read, remarks_on, remarks_on_two
+from motionloom.goals.remarks import Remark, numbers_read, parts_read, remarks_on, remarks_on_two
 from motionloom.server.job_request import JobRequest
 
 if TYPE_CHECKING:
@@ -12,16 +12,18 @@ MOST = 64
 """Texts of one job that are looked at."""
 
 
-def remarks_of(models: "Models", request: JobRequest) -> list[str]:
-    """Lines about the words of a request: numbers and actions read in them, words that nobody learned.
+def remarks_of(models: "Models", request: JobRequest) -> list[Remark]:
+    """Remarks on the words of a request: numbers and actions read in them, words that nobody learned.
 
     Raises `MotionloomError` where a text cannot be encoded.
     """
     if request.call is not None or request.task in ("predict", "switch"):
         return []
     timeline, prior = request.timeline, models.prior
-    texts = [request.prompt] if timeline is None else [segment.text for segment in timeline.segments[:MOST]]
+    texts = [request.prompt] if timeline is None else [segment.text for segment in timeline.segments]
+    texts = list(dict.fromkeys(texts))[:MOST]
     if request.task == "duet":
         return remarks_on_two(texts, models.block.known, prior.known, prior.text)
     read = [] if timeline is None or request.task != "generate" else [numbers_read(timeline), parts_read(timeline)]
-    return [*filter(None, read), *remarks_on(texts, prior.known, prior.text).values()]
+    remarks = [Remark(request.prompt, line) for line in read if line]
+    return remarks + remarks_on(texts, prior.known, prior.text)

@@ -26,6 +26,7 @@ from motionloom.io.text import parse_json
 from motionloom.server.bodies import body_of
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
+from motionloom.server.shelf import row
 
 ID = re.compile(r"[A-Za-z0-9_-]{1,80}")
 LARGEST = 2**53
@@ -105,9 +106,59 @@ class Saved:
                 return self._follow(data, value, asked, there)
             if over is None or over != f"{there.id or ''}.{there.revision}":
                 raise Refusal(409, _sentence(there, asked), more=there.public())
-            if asked.id != there.id:
-                self.aside()
-            return self._follow(data, value, asked, there if asked.id == there.id else None)
+            if asked.id == there.id:
+                return self._follow(data, value, asked, there)
+            self._shelve(there)
+            stamp = self._follow(data, value, asked, None)
+            self._taken_off(asked)
+            return stamp
+
+    def rows(self) -> list[dict[str, Any]]:
+        """What a list shows of each project of the folder, the open one first."""
+        with self._lock:
+            data, there = self.read(), self.stamp()
+            others = [one for one in self.project.shelf.rows() if there is None or one["id"] != there.id]
+            if data is None or there is None or there.id is None:
+                return others
+            return [row(_parsed(data), time.time()) | {"open": True}, *others]
+
+    def open(self, name: str) -> Stamp:
+        """Open another project of the folder; the one that was open stays in it. Its stamp.
+
+        Raises `Refusal` 404 where the folder has no such project.
+        """
+        with self._lock:
+            there = self.stamp()
+            if there is not None and there.id == name:
+                return there
+            data = self.project.shelf.read(name)
+            if data is None:
+                raise Refusal(404, "the folder has no such project; GET /projects lists those it has")
+            stamp = _stamp_of(_parsed(data))
+            if there is not None:
+                self._shelve(there)
+            self.project.save_project(data)
+            self.project.shelf.drop(name)
+            return stamp
+
+    def _shelve(self, there: Stamp) -> None:
+        """Keep what is open among the folder's other projects; what has no id gets another name."""
+        data = self.project.read_project()
+        if there.id is None or data is None:
+            self.aside()
+        else:
+            self.project.shelf.keep(there.id, data)
+
+    def _taken_off(self, asked: Stamp) -> None:
+        """What was kept of a project that is open now is gone, or is a project of its own where nobody has seen it."""
+        data = self.project.shelf.read(str(asked.id))
+        if data is None:
+            return
+        value = _parsed(data)
+        if not asked.follows(_stamp_of(value)):
+            name = secrets.token_hex(8)
+            self.project.shelf.keep(name, json.dumps(value | {"id": name}).encode())
+        self.project.shelf.drop(str(asked.id))
 
     def aside(self) -> str:
         """Give what is saved another name, which is returned; raises `Refusal` 404 where nothing is."""
@@ -182,6 +233,8 @@ def routes() -> list[BaseRoute]:
         Route("/project", saved_project, methods=["GET", "PUT"]),
         Route("/project/stamp", project_stamp),
         Route("/project/aside", project_aside, methods=["POST"]),
+        Route("/project/open", open_project, methods=["POST"]),
+        Route("/projects", projects),
     ]
 
 
@@ -203,3 +256,13 @@ async def project_stamp(request: Request) -> Response:
 
 async def project_aside(request: Request) -> Response:
     return JSONResponse({"kept": await run_in_threadpool(request.app.state.studio.saved.aside)})
+
+
+async def projects(request: Request) -> Response:
+    rows = await run_in_threadpool(request.app.state.studio.saved.rows)
+    return JSONResponse(rows, headers=NO_STORE)
+
+
+async def open_project(request: Request) -> Response:
+    saved, name = request.app.state.studio.saved, request.query_params.get("id", "")
+    return JSONResponse((await run_in_threadpool(saved.open, name)).public())

@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.timeline import Timeline, timeline_from, timeline_of_yaml
+from motionloom.goals.timeline import Timeline, timeline_from, timeline_of, timeline_of_yaml
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 
@@ -46,6 +46,14 @@ def timeline_json(text: str, project: Project, limits: Limits) -> Any:
     timeline, plain = timeline_of_yaml(text, folder=project.motions)
     _checked(timeline, limits)
     return plain
+
+
+def sentence_json(text: str, limits: Limits) -> Any:
+    """A sentence as the JSON of a timeline: a segment for each action that it has, as long as such actions take."""
+    if not text.strip() or len(text) > limits.prompt:
+        raise MotionloomError(f"a sentence has 1 to {limits.prompt} characters; got {len(text.strip())}")
+    timeline = _checked(timeline_of(" ".join(text.split())), limits)
+    return {"segments": [{"text": one.text, "seconds": round(one.seconds, 2)} for one in timeline.segments]}
 
 
 def _checked(timeline: Timeline, limits: Limits) -> Timeline:

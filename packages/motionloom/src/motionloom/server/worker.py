@@ -185,12 +185,19 @@ class Worker:
             job.end("done")
 
     def _keep(self, job: Job, result: "Result") -> None:
+        from motionloom.kinematics.capsules import overlaps
         from motionloom.kinematics.deeds import happened
+        from motionloom.retarget import joints22
 
-        request = job.request
+        request, measures = job.request, result.measures
         did = happened(result.people)
+        if request.task == "duet":
+            one, two = map(joints22, result.people)
+            measures = measures | {"overlaps": overlaps(one, two, result.people[0].fps)}
         about = {"task": request.task, "prompt": request.prompt, "seed": result.seed}
-        about |= {"measures": result.measures, "happened": did}
+        about |= {"measures": measures, "happened": did}
+        if result.blocks and request.timeline and request.timeline.start is None and not request.values.loop:
+            about["blocks"] = [list(block) for block in result.blocks]
         stored = self.project.add(result.people, about)
         motion = result.people[0]
         job.add_result(
@@ -201,7 +208,7 @@ class Worker:
                 "seconds": round(motion.seconds, 4),
                 "frames": len(motion),
                 "people": len(result.people),
-                "measures": result.measures,
+                "measures": measures,
                 "happened": did,
                 "remarks": result.remarks,
             }

@@ -53,7 +53,7 @@ def solve_stream(pieces: Iterable[Places], fps: float, *, foot_lock: bool = True
     waiting: Places | None = None
     before, tail = 0, None
     for piece in pieces:
-        waiting = piece if waiting is None else _strung(waiting, piece)
+        waiting = piece if waiting is None else strung(waiting, piece)
         while len(waiting) >= before + BLOCK + MARGIN:
             made = _as(tail, solve(waiting.crop(0, before + BLOCK + MARGIN), fps, foot_lock=foot_lock), before)
             yield _faded(tail, made.frames(before, before + BLOCK))
@@ -73,7 +73,8 @@ def solve(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
     return motion if places.goal.empty else fit(motion, places.goal)
 
 
-def _strung(first: Places, second: Places) -> Places:
+def strung(first: Places, second: Places) -> Places:
+    """The second behind the first."""
     return Places(
         np.concatenate([first.positions, second.positions]),
         np.concatenate([first.contacts, second.contacts]),

@@ -178,13 +178,15 @@ def long_features(
     segments: Iterable[Segment],
     *,
     past: "Past | None" = None,
+    begin: float = 0.0,
     sampling: Sampling | None = None,
     progress: Moves | None = None,
     **settings: Unpack[Settings],
 ) -> Iterator[np.ndarray]:
     """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
 
-    Piece i has ``round(seconds * fps)`` frames. ``batch_size``: rows per network call; it changes speed and memory, not
+    Piece i has ``round(seconds * fps)`` frames, the first and the last one more where ``past`` says so. begin: as of
+    `watching.Denoised`. ``batch_size``: rows per network call; it changes speed and memory, not
     the result. ``count``: so many motions, the pieces of one behind those of the other; there must be an end of the
     segments then. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
     """
@@ -210,7 +212,7 @@ def long_features(
         features=len(prior.mean),
         batch_size=BATCH,
         progress=progress,
-        view=ChainView(features, poses, each),
+        view=ChainView(features, poses, each, begin),
     )
     for row, state in made:
         yield features(row, state)
@@ -227,38 +229,33 @@ def _corrected(
 def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[Row]:
     """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
     before, number = len(past.known) if past else 0, 0
+    lead, trail, behind = (past.lead, past.trail, past.behind) if past else (0, 0, None)
     priors = AdaptedPriors(prior)
     iterator = iter(segments)
     segment = next(iterator, None)
     while segment is not None:
         following = next(iterator, None)
         overlap = 2 * max(1, round(segment.transition * prior.fps / 2)) if following else 0
-        frames, shared = round(segment.seconds * prior.fps), before if number else 0
+        frames, shared = round(segment.seconds * prior.fps) + lead, before if number else 0
+        frames += 0 if following else trail
         if frames < shared + overlap // 2 or frames < 2:
             raise MotionloomError(
                 f"segment {number + 1} ({segment.text[:40]!r}) of {segment.seconds:g} s is shorter than the halves of "
                 "its transitions together; make it longer or the transitions shorter"
             )
-        length = before + frames + overlap // 2
+        after = overlap // 2 if following or behind is None else len(behind)
+        length = before + frames + after
         own = priors.of(segment.adapters)
         bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
-        edits = [past.holder(prior, length)] if past and not number else []
+        edits = [past.holder(prior, length)] if past and not number and len(past.known) else []
+        if behind is not None and not following:
+            edits.append(holding(behind, prior, length, last=True))
         if segment.goal and not segment.goal.empty:
-            edits.append(toward(segment.goal, prior, first=before))
+            edits.append(toward(segment.goal, prior, first=before + lead))
         scale = guidance if segment.guidance is None else segment.guidance
-        yield Row(
-            segment.text,
-            frames,
-            before,
-            overlap // 2,
-            overlap,
-            scale,
-            bound,
-            null,
-            _one_after_the_other(edits),
-            own.net,
-        )
-        before, segment, number = overlap // 2, following, number + 1
+        correct = _one_after_the_other(edits)
+        yield Row(segment.text, frames, before, after, overlap, scale, bound, null, correct, own.net)
+        before, segment, number, lead = overlap // 2, following, number + 1, 0
 
 
 def with_loaded(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:
@@ -368,6 +365,12 @@ class Past:
     """(frames, 263) features of its last frames, not standardised."""
     end: GroundPose
     """Where the person is one frame behind them: at frame 0 of what follows."""
+    behind: np.ndarray | None = None
+    """(frames, 263) features of the frames that the long motion comes to; None: it ends by itself."""
+    lead: int = 0
+    """Frames that the first piece has more, before its segment begins."""
+    trail: int = 0
+    """Frames that the last piece has more, behind the end of its segment."""
 
     @staticmethod
     def of(motion: Motion) -> "Past":
@@ -384,17 +387,27 @@ class Past:
 
     def holder(self, prior: Prior, length: int) -> Correction:
         """Makes the first frames of a row's estimate the known ones, and the next ones leave them without a jump."""
-        count = len(self.known)
-        known = lengthened(self.known, length)[None]
-        mask = np.zeros(known.shape, np.bool_)
-        mask[:, :count] = True
-        meet = joining(known, mask, count, length)
+        return holding(self.known, prior, length)
 
-        def hold(clean: np.ndarray, level: int) -> np.ndarray:
-            features = np.where(mask, known, clean * prior.spread + prior.mean)
-            return ((meet(features) - prior.mean) / prior.spread)[0]
 
-        return hold
+def holding(own: np.ndarray, prior: Prior, length: int, *, last: bool = False) -> Correction:
+    """Makes the first frames of a row's estimate (or the last ones) known ones, the others join them without a jump.
+
+    own: (frames, 263) features, not standardised. length: frames of the row.
+    """
+    first, end = (0, length - len(own)) if last else (len(own), length)
+    held = slice(end, None) if last else slice(0, first)
+    known = np.zeros((1, length, own.shape[1]), own.dtype)
+    known[:, held] = own
+    mask = np.zeros(known.shape, np.bool_)
+    mask[:, held] = True
+    meet = joining(known, mask, first, end)
+
+    def hold(clean: np.ndarray, level: int) -> np.ndarray:
+        features = np.where(mask, known, clean * prior.spread + prior.mean)
+        return ((meet(features) - prior.mean) / prior.spread)[0]
+
+    return hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,10 +442,18 @@ class Track:
 
 
 def in_world(
-    prior: Prior, pieces: Iterable[np.ndarray], goals: deque[Goal | None], place: GroundPose, track: Track | None
+    prior: Prior,
+    pieces: Iterable[np.ndarray],
+    goals: deque[Goal | None],
+    place: GroundPose,
+    track: Track | None,
+    first: int = 0,
 ) -> Iterator[Places]:
-    """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
-    mean, spread, first = prior.mean, prior.spread, 0
+    """Each piece where the one before it ends; on a path bent once more, so that errors do not add up.
+
+    first: the frame of the path with which the pieces begin.
+    """
+    mean, spread = prior.mean, prior.spread
     for piece in pieces:
         asked = goals.popleft()
         goal = Goal.nothing(len(piece)) if asked is None else asked.placed(place)

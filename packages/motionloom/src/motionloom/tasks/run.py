@@ -16,7 +16,7 @@ from motionloom.goals.hold import FixedJoints
 from motionloom.goals.timeline import Timeline
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
-from motionloom.tasks import control, duet, edit, long, pair, predict, text, worded
+from motionloom.tasks import control, duet, edit, long, pair, predict, redraw, text, worded
 from motionloom.tasks.adapting import AdaptedPriors, adapt
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenated
@@ -87,6 +87,8 @@ class Plan:
     """Networks that see the goals."""
     people: tuple[Motion, ...] = ()
     """The motion that is changed, gone on from or answered; all who are in it."""
+    kept: tuple[Motion, Sequence[redraw.Block]] | None = None
+    """A motion of an earlier timeline and what it was sampled from: blocks that ask for the same keep its frames."""
     target: Motion | None = None
     """What is switched to, on the skeleton and at the rate of the first of them."""
     hold: FixedJoints | None = None
@@ -118,6 +120,8 @@ class Result:
     """What was missed, a sentence each."""
     about: Any = None
     """What the task says besides: `Worded` or `Controlled`."""
+    blocks: Sequence[redraw.Block] = ()
+    """What the blocks of a timeline were sampled from."""
 
 
 def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) -> Iterator[Result]:
@@ -202,17 +206,25 @@ def moves(progress: Progress, steps: int, rows: int) -> Moves:
 
 def _composed(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     assert plan.timeline is not None
-    segments = long.with_loaded(models.prior, plan.timeline.segments)
+    segments, lock = long.with_loaded(models.prior, plan.timeline.segments), plan.values.foot_lock
+    takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]
+    if plan.kept is not None and plan.count == 1 and (runs := redraw.runs_of(plan.kept[1], takes[0])) is not None:
+        moved = moves(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))
+        motion = redraw.redrawn(takes[0], *plan.kept, runs, moved)
+        measures = {"redrawn": [block for run in runs for block in range(run.first, run.end)]}
+        return iter([Result((motion,), measures=measures, blocks=takes[0].blocks)])
     made = (long.compose if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
         start=plan.start,
         path=plan.timeline.path,
-        foot_lock=plan.values.foot_lock,
+        foot_lock=lock,
         sampling=plan.sampling,
         progress=moves(progress, plan.sampling.steps, plan.count * len(segments)),
     )
-    return (Result((motion,)) for motion in made)
+    if plan.in_pieces:
+        return (Result((piece,)) for piece in made)
+    return (Result((motion,), blocks=timed.blocks) for timed, motion in zip(takes, made, strict=True))
 
 
 def _one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:

@@ -39,7 +39,7 @@ class Denoised:
     decode: Callable[[], np.ndarray]
     """Gives what `positions` gives; any float type."""
     begin: float = 0.0
-    """Seconds of the motion at which the poses begin: an `edit` shows the part of the clip that it samples."""
+    """Seconds of the motion at which the poses begin: where a part of a motion is sampled, that part is shown."""
 
     def positions(self) -> Array:
         """(rows, people, frames, 22, 3) metres, +Y up; bones may breathe.
@@ -108,6 +108,8 @@ class ChainView(Generic[R]):
     """What was kept of rows, from the first one on and in order, to (people, frames, 22, 3)."""
     each: int | None = None
     """Rows of one motion where the chain is several of them, which share nothing; None: all are of one."""
+    begin: float = 0.0
+    """As of `Denoised`."""
 
 
 class Latest(Generic[R]):
@@ -141,6 +143,7 @@ class Latest(Generic[R]):
                     self.steps,
                     [motion],
                     lambda parts=parts: self.view.poses(parts)[None],
+                    begin=self.view.begin,
                 )
 
     def _motion(self, number: int) -> int:

@@ -162,7 +162,8 @@ def generate_worded(
     ]
     seeds = chosen.seeds(len(asked))
     made = draw(prior, asked, seeds=seeds, foot_lock=foot_lock, sampling=chosen, progress=progress)
-    unknown = remarks_on([segment.text for one in asked for segment in one.segments], prior.known, prior.text)
+    texts = [segment.text for one in asked for segment in one.segments]
+    unknown = {one.text: one.line for one in remarks_on(texts, prior.known, prior.text)}
     return [
         replace(one, unknown={part.text: unknown[part.text] for part in one.timeline.segments if part.text in unknown})
         for one in made

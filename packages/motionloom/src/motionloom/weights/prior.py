@@ -27,7 +27,7 @@ from motionloom.runtime.text.known import Known, pack_known, unpack_known, with_
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.runtime.text.published import TEXTS, PublishedText
-from motionloom.weights.adapter import NET, Adapter, merged, origin
+from motionloom.weights.adapter import NET, Adapter, fingerprint, merged, origin
 from motionloom.weights.container import (
     PRIORS,
     check,
@@ -91,6 +91,11 @@ class Prior:
     def spread(self) -> Array:
         """``std``, with 1 for numbers that never change."""
         return np.where(self.std > 0, self.std, np.float32(1))
+
+    @cached_property
+    def digest(self) -> str:
+        """The `fingerprint` of the network, with what was merged into it."""
+        return fingerprint(self.net)
 
     def to_features(self, states: Array) -> Array:
         """Standardised states (..., frames, features) to features, `smoothed`."""

@@ -1,0 +1,94 @@
+"""Characters of the project: read as they arrive, with joints that somebody names where their own names say nothing."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from motionloom.errors import MotionloomError
+from motionloom.formats import characters
+from motionloom.io.character import Character, load_character
+from motionloom.io.gltf_read import open_glb, settled
+from motionloom.io.gltf_rig import read_rig
+from motionloom.io.text import parse_json
+from motionloom.retarget import joint_map
+from motionloom.retarget.names import parts_by_name
+from motionloom.retarget.topology import parts_by_shape
+from motionloom.server.project import Project
+from motionloom.server.refusal import Refusal
+from motionloom.skeleton import SMPL22, Skeleton
+
+SUFFIXES = (*characters(alone=True), ".bvh")
+Named = Mapping[str, str]
+"""Of the 22 joints by name the character's joints, as far as somebody named them."""
+
+
+def read_character(project: Project, part: Path, name: str, said: str | None = None) -> dict[str, Any]:
+    """A character's file that arrived as ``part``, into the project: its id and which of its joints are which.
+
+    said: JSON of the joints that somebody named. Raises `Refusal` 400 with the skeleton's ``joints`` and ``guesses``
+    where the 22 joints are not found on it, and `MotionloomError` for a file that holds none.
+    """
+    suffix = part.suffix
+    if suffix not in SUFFIXES:
+        raise MotionloomError(f"{name} is no character: its name must end in {', '.join(SUFFIXES)}")
+    named = named_joints(said)
+    try:
+        skeleton, character = loaded(part, named)
+        joints = joint_map(skeleton) if character is None else character.joints
+    except MotionloomError as error:
+        sentence = str(error).replace(str(part), name)
+        try:
+            asked = question(_skeleton(part))
+        except MotionloomError:
+            raise error from None
+        raise Refusal(400, sentence, more=asked) from None
+    found = {joint: list(points) for joint, points in joints.names().items()}
+    return {"id": project.add_character(part, name, suffix, named), "name": name, "joints": found}
+
+
+def named_joints(said: str | None) -> dict[str, str]:
+    """The joints that somebody named, out of JSON; raises `MotionloomError` for what is no such mapping."""
+    found = {} if not said else parse_json(said.encode(), "the character's joints")
+    if not isinstance(found, dict) or not all(isinstance(one, str) for one in found.values()):
+        raise MotionloomError('the character\'s \'joints\' are an object such as {"left_knee": "Shin_L"}')
+    return found
+
+
+def loaded(path: Path, named: Named) -> tuple[Skeleton, Character | None]:
+    """The skeleton of a character's file, which knows the named joints, and what a glTF holds beside it."""
+    if path.suffix == ".bvh":
+        skeleton = _skeleton(path)
+        joint_map(skeleton, named or None)
+        return _knowing(skeleton, named), None
+    character = load_character(path, joint_map=named or None)
+    skeleton = _knowing(character.skeleton, named)
+    return skeleton, replace(character, rig=replace(character.rig, skeleton=skeleton))
+
+
+def question(skeleton: Skeleton) -> dict[str, Any]:
+    """What somebody who names the joints is shown: where each is at rest, and what is guessed of them."""
+    rest = skeleton.rest_positions()
+    guesses = (parts_by_shape(skeleton) or {}) | parts_by_name(skeleton)
+    return {
+        "joints": [
+            {"name": name, "parent": parent, "place": [round(float(x), 4) for x in place]}
+            for name, parent, place in zip(skeleton.names, skeleton.parents, rest)
+        ],
+        "guesses": {part: skeleton.names[j] for part, j in guesses.items() if part in SMPL22.names},
+    }
+
+
+def _skeleton(path: Path) -> Skeleton:
+    if path.suffix == ".bvh":
+        from motionloom.io.bvh import read_bvh
+
+        return read_bvh(path).motion.skeleton
+    file = open_glb(path)
+    nodes, joints, _ = settled(file, 0, {})
+    return read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset()).skeleton
+
+
+def _knowing(skeleton: Skeleton, named: Named) -> Skeleton:
+    """The skeleton whose named joints are found wherever it is used."""
+    return replace(skeleton, humanoid={**skeleton.humanoid, **named}) if named else skeleton

@@ -1,0 +1,304 @@
+"""A long motion after a change of its timeline: only what changed is sampled, the other blocks keep their frames.
+
+A block is named by what it asks (`Block.asks`): words, length, goals, its part of the path, and how it is sampled. The
+blocks that an old motion was sampled from are compared with the new ones; each run of changed blocks is sampled with
+half a transition of its neighbours on either side, between known frames of the old motion, as a chain of its own
+(`long.chain_rows`). Outside of that the frames are the old ones bit for bit. What lies behind a run moves rigidly to
+where the person now comes to; on a path it stays where it is.
+"""
+
+import hashlib
+from collections import deque
+from collections.abc import Container, Sequence
+from dataclasses import asdict, dataclass, replace
+from difflib import SequenceMatcher
+from functools import cached_property, reduce
+from itertools import accumulate
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from motionloom import rotations as rot
+from motionloom.edits.fitting import fit
+from motionloom.features import humanml
+from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.goals.goal import Goal
+from motionloom.goals.segment import Segment
+from motionloom.ground import GroundPose
+from motionloom.kinematics.feet import clean_feet
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.motion import Motion, ground_pose
+from motionloom.requests.sampling import Sampling
+from motionloom.tasks.body import Places, strung
+from motionloom.tasks.long import LOOK_BACK, Past, Track, decoded, in_world, long_features
+from motionloom.tasks.sampling import Moves
+from motionloom.tasks.splice import carried, concatenated, splice
+from motionloom.weights.prior import Prior
+
+
+class Block(NamedTuple):
+    """What a block of a long motion was sampled from; plain values, so that a motion's file can keep them."""
+
+    asks: str
+    """Digest of what it asks and how it was sampled, its neighbours apart."""
+    frames: int
+    half: int
+    """Frames of the transition to the next one, on either side of the seam."""
+
+
+class Run(NamedTuple):
+    """Blocks ``old_first`` to before ``old_end`` of the old motion, where ``first`` to before ``end`` are to be."""
+
+    old_first: int
+    old_end: int
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, eq=False)
+class Timed:
+    """Segments, their path, and how they are sampled."""
+
+    prior: Prior
+    segments: Sequence[Segment]
+    path: Goal | None
+    sampling: Sampling
+    foot_lock: bool = True
+
+    @cached_property
+    def track(self) -> Track | None:
+        """The path, and which way it goes."""
+        return None if self.path is None else Track.along(self.path, self.prior.fps)
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        """Of the segments."""
+        how = asdict(self.sampling) | {"count": 1, "first": 0, "batch_size": 0, "seed": self.sampling.seeds(1)}
+        base = repr((sorted(how.items()), self.foot_lock, self.prior.digest))
+        result, first = [], 0
+        for one in self.segments:
+            frames = round(one.seconds * self.prior.fps)
+            digest = hashlib.sha256(repr((base, one.text, frames, one.guidance)).encode())
+            for goal in (one.goal, self.track and self.track.path.crop(first, first + frames)):
+                _add(digest, goal)
+            half = max(1, round(one.transition * self.prior.fps / 2))
+            result.append(Block(digest.hexdigest()[:20], frames, half))
+            first += frames
+        return result
+
+
+def runs_of(old: Sequence[Block], timed: Timed) -> list[Run] | None:
+    """The runs of blocks that have to be sampled, in order; None where no block stays.
+
+    A seam whose transition changed is a run of no block.
+    """
+    new = timed.blocks
+    first, least = 0, min(len(old), len(new))
+    while first < least and old[first].asks == new[first].asks:
+        first += 1
+    rest = 0
+    while rest < least - first and old[-1 - rest].asks == new[-1 - rest].asks:
+        rest += 1
+    some, others = ([one.asks for one in blocks[first : len(blocks) - rest]] for blocks in (old, new))
+    same: list[tuple[int, int, int]] = []
+    if len(some) == len(others):
+        same = [(k, k, 1) for k, (one, other) in enumerate(zip(some, others, strict=True)) if one == other]
+    matches = SequenceMatcher(None, some, others, autojunk=False).get_matching_blocks()
+    if sum(match.size for match in matches) > len(same):
+        same = list(matches)
+    pairs = [(k, k) for k in range(first)]
+    pairs += [(first + i + k, first + j + k) for i, j, size in same for k in range(size)]
+    pairs += [(len(old) - k, len(new) - k) for k in range(rest, 0, -1)]
+    pairs = _without_goals_at_seams(pairs, old, timed)
+    found, at = [], (-1, -1)
+    for i, j in [*pairs, (len(old), len(new))]:
+        seam = 0 < j < len(new) and (i, j) == (at[0] + 1, at[1] + 1) and old[i - 1].half != new[j - 1].half
+        if seam or (i, j) != (at[0] + 1, at[1] + 1):
+            found.append(Run(at[0] + 1, i, at[1] + 1, j))
+        at = i, j
+    return found if pairs else None
+
+
+def redrawn(
+    timed: Timed, old: Motion, was: Sequence[Block], runs: Sequence[Run], progress: Moves | None = None
+) -> Motion:
+    """The old motion with each run sampled, one after the other.
+
+    Args:
+        timed: what is asked.
+        old: the 22-joint person at 20 frames per second.
+        was: what it was sampled from.
+        runs: of `runs_of`; at least one block is in none of them.
+        progress: as of `long.compose`.
+    """
+    begins, old_begins = _begins(timed.blocks), _begins(was)
+    for run in runs:
+        lead, trail = _margins(run, was, timed.blocks)
+        moved = begins[run.first] - old_begins[run.old_first]
+        first = begins[run.first] - lead
+        old = _sampled(timed, old, run, _Stretch(first, old_begins[run.old_end] + moved + trail, lead, trail), progress)
+    return old
+
+
+def blocks_from(kept: Any, frames: int) -> list[Block]:
+    """Blocks as they were kept with a motion of so many frames, from plain values; none where they do not fit it."""
+    if not isinstance(kept, list) or not all(isinstance(one, list) and len(one) == 3 for one in kept):
+        return []
+    blocks = [Block(*one) for one in kept]
+    for one in blocks:
+        if not (isinstance(one.asks, str) and isinstance(one.frames, int) and isinstance(one.half, int)):
+            return []
+    sound = all(0 < one.half <= one.frames for one in blocks)
+    return blocks if sound and sum(one.frames for one in blocks) == frames else []
+
+
+# What is beside a change
+
+
+class _Stretch(NamedTuple):
+    """Frames of the motion that are sampled."""
+
+    first: int
+    end: int
+    """Behind the last one, in the old motion."""
+    lead: int
+    """How many of them lie before the first block that changed."""
+    trail: int
+    """How many of them lie behind the last one."""
+
+
+def _add(digest: Any, goal: Goal | None) -> None:
+    """Take what a goal asks into a digest."""
+    if goal is None or goal.empty:
+        digest.update(b"nothing")
+        return
+    for asked, values in ((goal.asked, goal.positions), (goal.facing_asked, goal.facing)):
+        digest.update(np.ascontiguousarray(asked).tobytes() + np.where(asked, values, 0.0).tobytes())
+
+
+def _without_goals_at_seams(pairs: list[tuple[int, int]], old: Sequence[Block], timed: Timed) -> list[tuple[int, int]]:
+    """Pairs of blocks that stay, without those that are asked for something where a transition is sampled again."""
+    new, left, before = timed.blocks, pairs, None
+    while left != before:
+        before, known = left, {*left, (-1, -1), (len(old), len(new))}
+        left = [(i, j) for i, j in before if not _asked_at_seams(timed, old, i, j, known)]
+    return left
+
+
+def _asked_at_seams(timed: Timed, old: Sequence[Block], i: int, j: int, known: Container[tuple[int, int]]) -> bool:
+    """Whether block j, which was i, is asked for something near a neighbour that is not among the known pairs."""
+    goal, new = timed.segments[j].goal, timed.blocks
+    if goal is None or goal.empty:
+        return False
+    asked = goal.asked.any(axis=(1, 2)) | goal.facing_asked
+    head = max(old[i - 1].half if i else 0, new[j - 1].half if j else 0)
+    changed = [(i - 1, j - 1) not in known or (i > 0 and old[i - 1].half != new[j - 1].half)]
+    changed += [(i + 1, j + 1) not in known or (j + 1 < len(new) and old[i].half != new[j].half)]
+    ends = asked[:head], asked[-max(old[i].half, new[j].half) :]
+    return any(change and end.any() for change, end in zip(changed, ends, strict=True))
+
+
+def _begins(blocks: Sequence[Block]) -> list[int]:
+    return [0, *accumulate(block.frames for block in blocks)]
+
+
+def _margins(run: Run, old: Sequence[Block], new: Sequence[Block]) -> tuple[int, int]:
+    """Frames of the blocks before and behind a run that are sampled with it: half a transition, the old or the new."""
+    lead = trail = 0
+    if run.first:
+        lead = max(old[run.old_first - 1].half, new[run.first - 1].half)
+    if run.end < len(new):
+        trail = max(blocks[end - 1].half for blocks, end in ((old, run.old_end), (new, run.end)) if end)
+    return lead, trail
+
+
+def _beside(old: Motion, at: _Stretch) -> Past:
+    """The old frames on either side of what is sampled, as the network sees them."""
+    before, behind = min(LOOK_BACK, at.first), min(LOOK_BACK, len(old) - 1 - at.end)
+    place, known = GroundPose(), np.zeros((0, WIDTH), np.float32)
+    if before:
+        positions = old.frames(at.first - before, at.first + 1).positions()
+        begin = ground_pose(positions[0])
+        known = humanml.encode(begin.from_world(positions))
+        place = decoded(known.astype(np.float64), begin)[1]
+    comes = None
+    if behind > 0:
+        positions = old.frames(at.end, at.end + behind + 1).positions()
+        comes = humanml.encode(ground_pose(positions[0]).from_world(positions))
+    return Past(known, place, comes, at.lead, at.trail)
+
+
+# One run
+
+
+def _sampled(timed: Timed, old: Motion, run: Run, at: _Stretch, progress: Moves | None) -> Motion:
+    """The old motion with one run sampled."""
+    past, prior, track = _beside(old, at), timed.prior, timed.track
+    if track and not at.first:
+        past = replace(past, end=track.place(0))
+    segments = timed.segments[run.first : run.end]
+    asked, begin = [], at.first + at.lead
+    for segment in segments:
+        frames = round(segment.seconds * prior.fps)
+        asked.append(track.asked(segment, begin, frames) if track else segment)
+        begin += frames
+    if not asked:  # a seam: no block, but the words of what follows
+        near = timed.segments[min(run.first, len(timed.segments) - 1)]
+        asked = [replace(near, seconds=0.0, goal=None)]
+    sampling = replace(timed.sampling, seed=timed.sampling.seeds(1)[0] + run.first, count=1, first=0)
+    seconds = at.first / prior.fps
+    rows = long_features(prior, asked, past=past, begin=seconds, sampling=sampling, progress=progress)
+    whole = np.concatenate([*rows, *([] if past.behind is None else [past.behind[:1]])])
+    lengths = [at.lead, *(block.frames for block in timed.blocks[run.first : run.end])]
+    parts = np.split(whole, list(accumulate(lengths)))
+    goals = [None, *(segment.goal for segment in segments), None]
+    some = [(part, goal) for part, goal in zip(parts, goals, strict=True) if len(part)]
+    placed = in_world(prior, (part for part, _ in some), deque(goal for _, goal in some), past.end, track, at.first)
+    return _put_in(timed, old, at, past, reduce(strung, placed))
+
+
+def _put_in(timed: Timed, old: Motion, at: _Stretch, past: Past, made: Places) -> Motion:
+    """The old motion with places in a stretch of it; they have a frame more where the old one goes on behind them."""
+    before = [old.frames(0, at.first)] if at.first else []
+    around = [part.frames(len(part) - len(past.known), len(part)) for part in before]
+    seen = [_as_they_are(part, past.known) for part in around]
+    behind, beside = [old.frames(at.end, len(old))] if at.end < len(old) else [], []
+    if past.behind is not None:
+        if timed.track is None:
+            here, to = ground_pose(behind[0].frames(0, 1).positions()[0]), ground_pose(made.positions[-1])
+            behind = [_carried(behind[0], here, to)]
+        made = made.crop(0, len(made) - 1)
+        beside = [behind[0].frames(0, len(past.behind))]
+    first, end = len(past.known), len(past.known) + len(made)
+    seen += [made, *(_as_they_are(part, past.behind) for part in beside)]
+    solved = _solved(timed, reduce(strung, seen), first, end)
+    held = concatenated(*around, solved.frames(first, end), *beside)
+    return concatenated(*before, splice(held, solved, first, last=end).frames(first, end), *behind)
+
+
+def _solved(timed: Timed, places: Places, first: int, end: int) -> Motion:
+    """A body in these places; a foot that is planted before ``first`` or behind ``end`` stands where it is there."""
+    motion = motion_from_positions(places.positions, timed.prior.fps)
+    if timed.foot_lock:
+        for _ in range(2):  # what lies before, and then, backwards in time, what lies behind
+            rest = [motion.frames(end, len(motion))] if end < len(motion) else []
+            cleaned = clean_feet(motion.frames(0, end), contacts=places.contacts[:end], shown=first)
+            motion = _backwards(concatenated(cleaned, *rest))
+            places = Places(places.positions[::-1], places.contacts[::-1], places.goal)
+            first, end = len(motion) - end, len(motion)
+    return motion if places.goal.empty else fit(motion, places.goal)
+
+
+def _backwards(motion: Motion) -> Motion:
+    return replace(motion, root=motion.root[::-1].copy(), rotations=motion.rotations[::-1].copy())
+
+
+def _as_they_are(motion: Motion, known: np.ndarray | None) -> Places:
+    assert known is not None
+    return Places(motion.positions(), known[:, LAYOUT["contacts"]].astype(np.float64), Goal.nothing(len(motion)))
+
+
+def _carried(motion: Motion, here: GroundPose, to: GroundPose) -> Motion:
+    """The motion moved along the floor so that one ground pose becomes another."""
+    turn = rot.rotvec_to_quat(np.array([0.0, to.facing - here.facing, 0.0]))
+    return carried(motion, turn, np.array([here.x, 0.0, here.z]), np.array([to.x, 0.0, to.z]))

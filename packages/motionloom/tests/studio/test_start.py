@@ -1,0 +1,174 @@
+"""The first minute and the next projects: the first question, New, Open, Recent, Save as."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.studio.studio import Studio
+
+LEFT_SHOULDER, RIGHT_SHOULDER, LEFT_WRIST, RIGHT_WRIST, HEAD = 16, 17, 20, 21, 15
+DEEDS = {
+    "a person walks, turns around and waves": ("walks", "turns 1"),
+    "a person walks forward, then sits down": ("walks", "ends sitting"),
+    "a person picks something up off the floor and walks on": ("squats once", "walks"),
+    "a child skips along happily": ("hops on one leg", "forward"),
+    "a person is doing jumping jacks": ("does jumping jacks",),
+    "a person claps their hands": ("claps",),
+}
+"""What is measured in the motion of each sentence that the page begins with."""
+
+
+def names(studio: Studio) -> list[str]:
+    return [one["name"] for one in studio.server.ask("/projects")]
+
+
+def from_menu(studio: Studio, name: str) -> None:
+    menu = studio.page.locator(".menu[data-key=Project]")
+    menu.locator("summary").click()
+    menu.locator(".row").filter(has=studio.page.get_by_text(name, exact=True)).click()
+
+
+def say(studio: Studio, sentence: str) -> None:
+    studio.page.keyboard.type(sentence)
+    studio.key("Enter")
+    studio.page.wait_for_selector("#start", state="hidden")
+
+
+def test_a_new_folder_asks_what_the_person_should_do_while_somebody_moves(empty: Studio):
+    page = empty.page
+    assert page.locator("#start").is_visible()
+    assert page.evaluate("document.activeElement.getAttribute('aria-label')") == "What should the person do?"
+    assert sorted(page.locator("#start .chip").all_inner_texts()) == sorted(DEEDS)
+    empty.until("document.querySelector('.clock').textContent > '0.5'")
+
+
+@pytest.mark.parametrize("sentence", DEEDS)
+def test_each_sentence_that_is_offered_is_obeyed(empty: Studio, sentence: str):
+    """Measured on the joints, as drawn by a click on it in a new project."""
+    if not empty.page.locator("#start").is_visible():
+        from_menu(empty, "New project")
+    empty.page.locator("#start .chip", has_text=sentence).click()
+    empty.page.wait_for_selector("#start", state="hidden")
+    project = empty.project()
+    assert project["name"] == sentence[:40]
+    told = project["takes"][0]["told"][0]
+    assert all(deed in told for deed in DEEDS[sentence]), told
+    if "waves" in sentence:
+        [body] = empty.motion(project)
+        wave = body[-round(project["segments"][-1]["seconds"] * 20) :]
+        raised = wave[:, [LEFT_WRIST, RIGHT_WRIST], 1] - wave[:, [LEFT_SHOULDER, RIGHT_SHOULDER], 1]
+        assert raised.max() > 0.1, "a hand is above its shoulder"
+        hand = wave[:, RIGHT_WRIST] - wave[:, RIGHT_SHOULDER]
+        side = wave[:, LEFT_SHOULDER] - wave[:, RIGHT_SHOULDER]
+        sway = np.diff(np.sign(np.diff((hand * side).sum(-1)[::4])))
+        assert (sway != 0).sum() >= 3, "and goes to and fro"
+
+
+def test_what_is_typed_becomes_a_block_for_each_action(empty: Studio):
+    from_menu(empty, "New project")
+    assert empty.page.locator(".notice, .said").count() == 0, "nobody is scolded for what they have not said yet"
+    say(empty, "a person jumps, then sits down")
+    project = empty.project()
+    assert [one["text"] for one in project["segments"]] == ["a person jumps", "a person sits down"]
+    assert project["name"] == "a person jumps, then sits down"
+    assert len(project["takes"]) == 1
+
+
+def test_other_projects_are_opened_with_their_own_undo_and_none_is_lost(empty: Studio):
+    page = empty.page
+    before = set(names(empty))
+    from_menu(empty, "New project")
+    say(empty, "a person kneels down")
+    empty.drawn()
+    empty.key("Alt+o")
+    card = page.locator("#projects .card", has_text="a person jumps, then sits down").first
+    card.click()
+    page.wait_for_selector("#projects", state="hidden")
+    empty.says(page.locator(".block"), "a person jumps")
+    assert set(names(empty)) == before | {"a person kneels down"}
+    empty.key("Control+z")
+    assert page.locator(".block .words").all_inner_texts() == ["double-click to write"], "its own first state"
+    empty.key("Control+Shift+z")
+    empty.drawn()
+    assert not empty.faults
+
+
+def test_save_as_goes_on_in_a_copy(empty: Studio):
+    page = empty.page
+    empty.drawn()
+    old = empty.server.ask("/project")
+    from_menu(empty, "Save as another project")
+    page.locator("#name input").fill("second version")
+    empty.key("Enter")
+    page.wait_for_selector("#name", state="hidden")
+    empty.key("d")
+    project = empty.project()
+    assert (project["name"], len(project["segments"])) == ("second version", len(old["segments"]) + 1)
+    assert project["id"] != old["id"]
+    empty.key("Alt+o")
+    page.locator("#projects .card", has_text=old["name"]).first.click()
+    page.wait_for_selector("#projects", state="hidden")
+    assert empty.project()["segments"] == old["segments"]
+
+
+def test_a_project_file_is_opened_as_a_project_of_its_own(empty: Studio, tmp_path: Path):
+    old = empty.project()
+    file = tmp_path / "film.loom.json"
+    blocks = [{"id": "a", "text": "a person sits down", "seconds": 2}]
+    file.write_text(json.dumps({"version": 2, "name": "From a file", "segments": blocks}))
+    empty.drop(file)
+    empty.says(empty.page.locator(".block"), "a person sits down")
+    project = empty.project()
+    assert (project["name"], project["id"] != old["id"]) == ("From a file", True)
+    assert old["name"] in names(empty)
+
+
+def test_undo_goes_on_behind_a_reload(studio: Studio):
+    studio.key("d", "d")
+    assert len(studio.blocks()) == 3
+    studio.page.wait_for_timeout(600)
+    studio.load()
+    studio.key("Control+z", "Control+z")
+    assert len(studio.blocks()) == 1
+    studio.load()
+    studio.key("Control+Shift+z")
+    assert len(studio.blocks()) == 2
+
+
+def test_history_by_pictures_goes_to_any_state(studio: Studio):
+    page = studio.page
+    studio.key("d", "d", "d")
+    studio.drawn()
+    studio.key("Shift+H")
+    cards = page.locator("#history .card")
+    assert cards.count() >= 4
+    studio.until(
+        "[...document.querySelectorAll('#history .card')][0].querySelector('canvas')"
+        ".getContext('2d').getImageData(0, 0, 300, 150).data.some(one => one > 0)"
+    )
+    cards.nth(2).click()
+    assert len(studio.blocks()) == 2
+    studio.key("Control+Shift+z")
+    assert len(studio.blocks()) == 3
+
+
+def test_the_palette_finds_and_does_everything(studio: Studio):
+    page = studio.page
+    studio.key("Control+k")
+    page.keyboard.type("dupl")
+    assert page.locator("#palette [role=option]").all_inner_texts()[0].startswith("Duplicate the block")
+    studio.key("Enter")
+    page.wait_for_selector("#palette", state="hidden")
+    assert len(studio.blocks()) == 2
+    studio.key("Control+k")
+    named = page.locator("#palette [role=option] .grow").all_inner_texts()
+    studio.key("Escape")
+    page.wait_for_selector("#palette", state="hidden")
+    studio.key("?")
+    page.wait_for_selector("#help[open]")
+    listed = set(page.locator("#help dd").all_inner_texts()) - {"Everything that can be done"}
+    missing = [one for one in listed if not any(name.startswith(one) for name in named)]
+    assert missing in ([], ["Redo"], ["Paste blocks behind the selected one"]), missing
+    studio.key("Escape")

@@ -1,0 +1,75 @@
+/** New, open, recent, save as: the folder holds several projects, and none is overwritten. */
+
+import { type Project, blankProject, segment } from "../project/model";
+import { type ProjectRow, blocksOf, projectRows } from "../server/api";
+import { type App, fail } from "./app";
+import type { Drawer } from "./drawing";
+import type { Saver } from "./saving";
+
+/** Letters of a sentence that name its project. */
+const NAMED = 40;
+
+export class Projects {
+  constructor(
+    private readonly app: App,
+    private readonly saver: Saver,
+    private readonly drawer: Drawer,
+  ) {}
+
+  /** A new project, in which the first question is asked. */
+  blank(): Promise<boolean> {
+    return this.replace("New project", () => this.saver.begin(blankProject()), true);
+  }
+
+  /** A project out of a file becomes one of the folder; the one that was open stays there. */
+  async add(project: Project): Promise<void> {
+    await this.replace("Open", () => this.saver.begin(project));
+  }
+
+  async open({ id, name }: Pick<ProjectRow, "id" | "name">): Promise<void> {
+    if (id !== this.app.session.value.stamp.id) await this.replace(`Open ${name}`, () => this.saver.open(id));
+  }
+
+  /** Go on in a copy of another name; what was saved of this one stays as it is. */
+  saveAs(name: string): Promise<boolean> {
+    return this.replace("Save as", () => this.saver.begin({ ...this.app.project.value, name }));
+  }
+
+  rows(): Promise<readonly ProjectRow[]> {
+    return projectRows();
+  }
+
+  /** Answer the first question: the sentence becomes a block for each of its actions. */
+  async start(sentence: string, seed?: number): Promise<void> {
+    try {
+      const blocks = await blocksOf(sentence);
+      this.app.session.update({ welcome: false, time: 0, playing: true, selection: { kind: "none" } });
+      this.app.project.change("say what happens", (old) => ({
+        ...old,
+        name: old.name === blankProject().name ? sentence.trim().slice(0, NAMED) : old.name,
+        seed: seed ?? old.seed,
+        segments: blocks.map((one) => segment(one.text, one.seconds)),
+        frozen: [],
+        base: null,
+        only: null,
+      }));
+    } catch (error) {
+      fail(this.app, error);
+    }
+  }
+
+  private async replace(what: string, deed: () => Promise<void>, welcome = false): Promise<boolean> {
+    try {
+      this.drawer.stop();
+      this.app.session.update({ welcome: false });
+      await deed();
+      this.app.session.update({ welcome, dialog: null, tool: "select", playing: false });
+      this.drawer.loadTakes();
+      if (!welcome) this.drawer.schedule();
+      return true;
+    } catch (error) {
+      fail(this.app, error, what);
+      return false;
+    }
+  }
+}
