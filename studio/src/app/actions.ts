@@ -54,16 +54,12 @@ export interface Parts {
 }
 
 export function actions(parts: Parts): Actions {
-  return {
-    ...play(parts),
-    ...blocks(parts),
-    ...timeline(parts),
-    ...stage(parts),
-    ...takes(parts),
-    ...exports(parts),
-    ...projects(parts),
-    ...windows(parts),
-  };
+  const groups = [play, blocks, timeline, stage, takes, exports, projects, windows].map((group) => group(parts));
+  const all = groups.flatMap((group) => Object.entries(group));
+  const keys = all.flatMap(([, action]) => action.keys);
+  const twice = [all.map(([name]) => name), keys].flatMap((each) => each.filter((one, at) => each.indexOf(one) < at));
+  if (twice.length) throw new Error(`two actions have the name or key ${twice.join(", ")}`);
+  return Object.fromEntries(all);
 }
 
 function play({ app }: Parts): Actions {
@@ -239,7 +235,7 @@ function timeline({ app, zoom, fit }: Parts): Actions {
     overwriting: {
       group,
       label: "Moved blocks push the others aside, or lie over them",
-      keys: ["Shift+R"],
+      keys: ["Shift+O"],
       run: () => session.update({ overwriting: !session.value.overwriting }),
     },
   };
@@ -305,7 +301,7 @@ function takes({ app, deeds, drawer }: Parts): Actions {
   };
   return {
     draw: { group, label: "Draw again with another seed", keys: ["R"], run: () => drawer.again() },
-    all: { group, label: "Draw all blocks, none kept", keys: ["Shift+R"], run: () => drawer.all() },
+    drawAll: { group, label: "Draw all blocks, none kept", keys: ["Shift+R"], run: () => drawer.all() },
     four: {
       group,
       label: "Four takes side by side, or one",

@@ -10,7 +10,7 @@ const STORE = "histories";
 const STEPS = 200;
 const PROJECTS = 12;
 /** Milliseconds of quiet until what was done is kept. */
-const QUIET = 300;
+const QUIET = 100;
 
 interface Stored extends Kept<Project> {
   readonly present: Project;
@@ -56,8 +56,10 @@ export function remember(history: History<Project>, id: () => string): void {
 }
 
 async function write(base: IDBDatabase, id: string, stored: Stored): Promise<void> {
+  const writing = base.transaction(STORE, "readwrite");
+  writing.objectStore(STORE).put(stored, id);
+  writing.commit(); // by itself, since a page that is left does not wait for more
   const store = base.transaction(STORE, "readwrite").objectStore(STORE);
-  store.put(stored, id);
   const ids = (await done(store.getAllKeys())) as string[];
   if (ids.length <= PROJECTS) return;
   const ages = await Promise.all(ids.map(async (one) => ({ one, at: ((await done(store.get(one))) as Stored).at })));

@@ -55,7 +55,7 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
       "div",
       { class: "row wrap" },
       deed("draw", "Draw again"),
-      keptTake(project)?.how === CHANGED && deed("all", "Draw all blocks"),
+      keptTake(project)?.how === CHANGED && deed("drawAll", "Draw all blocks"),
       deed("four", project.count === 4 ? "One take" : "Four takes"),
       deed("predict", "What comes next", none),
       deed("loop", "Loop", none),

@@ -2,7 +2,7 @@
 
 export const CHIPS = [
   { text: "a person walks, turns around and waves", seed: 4 },
-  { text: "a person walks forward, then sits down", seed: 1 },
+  { text: "a person walks forward, then sits down", seed: 3 },
   { text: "a person picks something up off the floor and walks on", seed: 1 },
   { text: "a child skips along happily", seed: 1 },
   { text: "a person is doing jumping jacks", seed: 1 },

@@ -158,7 +158,7 @@ export class TimelineView {
     const marks = Array.from({ length: Math.floor((end + ROOM / this.scale) / step) + 1 }, (_, index) =>
       h("span", { class: "mark", style: this.left(index * step) }, `${index * step} s`),
     );
-    const { range } = this.app.session.value;
+    const { range, selection } = this.app.session.value;
     const frozen = this.app.project.value.frozen.map(([from, to]) =>
       h("span", { class: "frozen", style: this.span(from, to), title: "Frozen: stays as it is" }),
     );
@@ -181,6 +181,8 @@ export class TimelineView {
           end,
           range,
           this.app.project.value.frozen,
+          this.app.project.value.markers,
+          selection.kind === "marker" && selection.id,
           overlaps.map((one) => [one.title, one.style.left]),
         ]),
         "aria-label": "Time: drag to scrub, Shift and drag to mark a stretch",

@@ -93,7 +93,7 @@ def test_several_blocks_are_dragged_with_a_mark_where_they_land(four: Studio):
 
 
 def test_a_block_lies_over_others_which_stay_when_they_are(four: Studio):
-    four.key("Shift+R")
+    four.key("Shift+O")
     x, y = block(four, 1)
     four.drag((x, y), (x + 2 * 84, y))
     assert four.blocks() == [
@@ -102,7 +102,7 @@ def test_a_block_lies_over_others_which_stay_when_they_are(four: Studio):
         ("a person jumps", 1),
         ("a person sits", 2),
     ]
-    four.key("Shift+R", "Control+z")
+    four.key("Shift+O", "Control+z")
     four.drag((x, y), (x + 2 * 84, y), hold="Shift")
     assert [seconds for _, seconds in four.blocks()] == [3, 1, 1, 2], "Shift is the other way for once"
 

@@ -31,6 +31,7 @@ def from_menu(studio: Studio, name: str) -> None:
 
 
 def say(studio: Studio, sentence: str) -> None:
+    studio.until("document.activeElement.closest('#start')")
     studio.page.keyboard.type(sentence)
     studio.key("Enter")
     studio.page.wait_for_selector("#start", state="hidden")
@@ -169,6 +170,8 @@ def test_the_palette_finds_and_does_everything(studio: Studio):
     studio.key("?")
     page.wait_for_selector("#help[open]")
     listed = set(page.locator("#help dd").all_inner_texts()) - {"Everything that can be done"}
-    missing = [one for one in listed if not any(name.startswith(one) for name in named)]
-    assert missing in ([], ["Redo"], ["Paste blocks behind the selected one"]), missing
+    missing = {one for one in listed if not any(name.startswith(one) for name in named)}
+    assert missing <= {"Redo", "Paste blocks behind the selected one"}, "which have nothing to do now"
+    keys = page.locator("#help dt kbd").all_inner_texts()
+    assert sorted(keys) == sorted(set(keys)), "a key has one meaning"
     studio.key("Escape")
