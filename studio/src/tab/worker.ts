@@ -1,13 +1,8 @@
 /** The prior in a thread of its own, so that the page never stalls. */
 
-import type { GroundPose } from "../prior/features";
 import { Failed, Network } from "../prior/network";
-import { rowSeed } from "../prior/noise";
-import { placesOf } from "../prior/person";
-import { startOf } from "../prior/path";
-import { Prior, type Watcher, flat, sketched } from "../prior/prior";
-import { rounded } from "../prior/turns";
-import { measured, missed, nextShare, partsOf, reading } from "../prior/wanted";
+import { Prior, flat, sketched } from "../prior/prior";
+import { type Viewer, spoken } from "../prior/spoken";
 import { type Manifest, Packed } from "../prior/weights";
 import { type Graphics, hasGraphics, runtime, threads } from "./device";
 import { LONGEST } from "./link";
@@ -88,52 +83,16 @@ async function begin(base: string): Promise<Prior> {
   return open(packed, base, true).catch((error: Error) => onProcessors(packed, base, error));
 }
 
-/** Tries of a motion whose steps are not as many as the words say. */
-const TRIES = 6;
-
-async function draw(prior: Prior, { id, segments, literal, seed, takes, path }: Draw): Promise<void> {
-  const { fps } = prior;
-  const read = segments.map(({ text }) => (literal ? null : reading(text, fps, LONGEST).amount));
-  let shares = segments.map(() => 1);
-  let best: { off: number; drawn: Said } | null = null;
-  for (let number = 0; number < TRIES; number += 1) {
-    const each = segments.map(({ text, seconds }, n) => partsOf(text, seconds, read[n]!, fps, shares[n]));
-    const parts = each.flat();
-    const way = path.length > 1 ? prior.way(parts, path) : null;
-    const made = await prior.features(
-      parts,
-      number ? rowSeed(seed, number) : seed,
-      takes,
-      watching(id, way ? startOf(way) : undefined),
-      way,
-    );
-    if (!made.every((features) => features.every(Number.isFinite))) throw new Failed("its numbers are none");
-    const bodies = made.map((features) => prior.person(features, parts, way));
-    const places = bodies.map(placesOf);
-    const sizes = places.map((seen) => {
-      let at = 0;
-      return each.map((own, n) => {
-        const begin = at;
-        at += own.reduce((frames, { seconds }) => frames + rounded(seconds * fps), 0);
-        return read[n] && !way ? measured(read[n], seen.slice(begin, at), fps) : null;
-      });
-    });
-    const misses = sizes.map((own) => own.flatMap((size, n) => (size !== null && missed(read[n]!, size)) || []));
-    const own = sizes[0]!;
-    const off = read.reduce(
-      (sum, one, n) => sum + (one?.kind === "steps" ? Math.abs(one.size - (own[n] ?? one.size)) : 0),
-      0,
-    );
-    if (!best || off < best.off) best = { off, drawn: { kind: "drawn", id, bodies, takes: places.map(flat), misses } };
-    if (!off || takes > 1) break;
-    shares = shares.map((share, n) => (own[n] === null ? share : nextShare(share, read[n]!.size, own[n]!)));
-  }
-  say(best!.drawn);
+async function draw(prior: Prior, { id, takes, path, ...wish }: Draw): Promise<void> {
+  const made = await spoken(prior, { ...wish, takes, path, longest: LONGEST }, watching(id));
+  if (!made.every(({ features }) => features.every(Number.isFinite))) throw new Failed("its numbers are none");
+  const [bodies, misses] = [made.map((one) => one.body), made.map((one) => one.misses)];
+  say({ kind: "drawn", id, bodies, takes: made.map((one) => flat(one.places)), misses });
 }
 
 /** What the page hears while a motion is drawn; ends the drawing where it is no longer wanted. */
-function watching(id: number, begin: GroundPose | undefined): Watcher {
-  return async (done, of, clean) => {
+function watching(id: number): Viewer {
+  return async (done, of, clean, begin) => {
     const takes = done * 3 >= of ? clean().map((features) => sketched(features, begin)) : [];
     say({ kind: "sketch", id, done, of, takes });
     await new Promise((heard) => setTimeout(heard)); // lets a newer wish be heard

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import load
+from motionloom import generate, load
 from motionloom.goals.goal import start_of
 from motionloom.goals.paths import root_path
 from motionloom.goals.segment import Segment
+from motionloom.kinematics.physics import turn
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.skeleton import SMPL22
@@ -28,6 +29,7 @@ from tests.tab.conftest import Quiet
 
 pytestmark = pytest.mark.slow
 PACKAGE = made.STUDIO / "packages" / "prior"
+TURN = "turn left 90 degrees"
 
 
 @pytest.fixture(scope="module")
@@ -69,13 +71,15 @@ def alike(folder: Path, number: int, features: np.ndarray, motion: Motion, std: 
 
 
 def test_in_node_it_draws_what_python_draws(app: Path, prior: Prior, tmp_path: Path) -> None:
-    """A sentence, a chain and a path, on the noise of the same seeds; and refusals are sentences."""
+    """A sentence, a chain, a path and a number in words, on the noise of the same seeds; and refusals are sentences."""
     made.EXPORT["export"](prior, "0" * 64, tmp_path, precise=True)
     text, chain = numbers.SENTENCES[1], numbers.CHAINS[0]
     requests = [
         {"words": text, "seconds": 2.5, "seed": 3},
         {"words": [{"text": one, "seconds": seconds} for one, seconds in chain], "seed": 4},
         {"words": "a person walks", "seconds": 5, "seed": 4, "path": numbers.PATH},
+        {"words": TURN, "seed": 2},
+        {"words": TURN, "seconds": 2.5, "seed": 2, "literal": True},
     ]
     (tmp_path / "requests.json").write_text(json.dumps(requests))
     said = in_node(app, tmp_path)
@@ -101,6 +105,13 @@ def test_in_node_it_draws_what_python_draws(app: Path, prior: Prior, tmp_path: P
     assert (np.abs(read(tmp_path, "2.features", features) - features) / std).max() < 1e-2
     pelvis = np.fromfile(tmp_path / "2.positions", "<f4").reshape(-1, 22, 3)[[0, -1], 0]
     assert np.abs(pelvis[:, [0, 2]] - np.array(numbers.PATH)[[0, -1]]).max() < 0.05
+    turned = np.fromfile(tmp_path / "3.positions", "<f4").reshape(-1, 22, 3)
+    [alone] = generate(prior, TURN, seed=2)
+    assert len(turned) == len(alone)
+    assert np.degrees(turn(turned)) == pytest.approx(90, abs=10)
+    assert said["missed"][3] == []
+    [features] = sample_features(prior, [TURN], [50], seeds=[2])
+    assert (np.abs(read(tmp_path, "4.features", features) - features) / std).max() < 1e-2
 
 
 TYPED = """

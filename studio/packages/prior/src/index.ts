@@ -2,9 +2,10 @@
 
 import { JOINTS as NAMES, PARENTS as ABOVE } from "../../../src/body/skeleton";
 import { Network, type Runtime as Built } from "../../../src/prior/network";
-import { startOf } from "../../../src/prior/path";
-import { type Body, REST as OFFSETS, placesOf } from "../../../src/prior/person";
-import { Prior as Sampler, flat, literal, sketched } from "../../../src/prior/prior";
+import { REST as OFFSETS } from "../../../src/prior/person";
+import { Prior as Sampler, flat, sketched } from "../../../src/prior/prior";
+import { type Take, type Viewer, spoken } from "../../../src/prior/spoken";
+import { reading } from "../../../src/prior/wanted";
 import { type Manifest, Packed } from "../../../src/prior/weights";
 import { bvh } from "../../../src/tab/bvh";
 import { LARGEST, LETTERS, LONGEST, MOST, SHORTEST, SHORTEST_OF_SEVERAL } from "../../../src/tab/link";
@@ -40,8 +41,10 @@ export interface Sentence {
 }
 
 export interface GenerateOptions {
-  /** Length where the words are one text: 0.5 to 10 (default: 5). */
+  /** Length where the words are one text: 0.5 to 10 (default: as long as numbers in the words take, else 5). */
   readonly seconds?: number;
+  /** Numbers in the words ("turn left 90 degrees", "jump three times") are left to the network (default: they are kept). */
+  readonly literal?: boolean;
   /** A whole number from 0 to 2^40 (default: 0): the same one gives the same motion, in Python too. */
   readonly seed?: number;
   /** Points on the ground (x, z), metres, which the pelvis follows at an even pace; 2 or more. */
@@ -64,6 +67,8 @@ export interface Motion {
   readonly root: Float32Array;
   /** What the network made, before bones had a length and feet stood still: frames x 263 (docs/features.md). */
   readonly features: Float32Array;
+  /** A sentence for each number in the words that the motion does not keep. */
+  readonly missed: readonly string[];
   /** The motion as a BVH file, in metres. */
   bvh(): string;
 }
@@ -122,18 +127,17 @@ export class Prior {
 
   /** A motion of a text, or of several sentences one after the other, which share a second where they meet. */
   async generate(words: string | readonly Sentence[], options: GenerateOptions = {}): Promise<Motion> {
-    const { seconds = 5, seed = 0, path, progress, signal } = options;
-    const sentences = typeof words === "string" ? [{ text: words, seconds }] : words;
-    check(sentences, seed, path);
-    const way = path ? this.sampler.way(sentences, path) : null;
-    const begin = way ? startOf(way) : undefined;
-    const watch = async (call: number, of: number, takes: () => Float32Array[]): Promise<void> => {
+    const { seed = 0, path = [], literal = false, progress, signal } = options;
+    const { fps } = this.sampler;
+    const said = typeof words === "string" && !literal ? reading(words, fps, LONGEST).seconds : null;
+    const segments = typeof words === "string" ? [{ text: words, seconds: options.seconds ?? said ?? 5 }] : words;
+    check(segments, seed, options.path);
+    const watch: Viewer = async (call, of, takes, begin) => {
       signal?.throwIfAborted();
       progress?.(call, of, () => sketched(takes()[0]!, begin));
     };
-    const parts = literal(sentences);
-    const [features] = await this.sampler.features(parts, seed, 1, watch, way);
-    return motionOf(this.sampler.person(features!, parts, way), features!);
+    const [take] = await spoken(this.sampler, { segments, literal, seed, takes: 1, path, longest: LONGEST }, watch);
+    return motionOf(take!);
   }
 }
 
@@ -152,16 +156,17 @@ function check(sentences: readonly Sentence[], seed: number, path: GenerateOptio
     throw new RangeError("a path has two points or more, each two numbers of metres");
 }
 
-function motionOf(body: Body, features: Float32Array): Motion {
+function motionOf({ body, features, places, misses }: Take): Motion {
   const { fps, root, turns } = body;
   return {
     fps,
     frames: root.length,
     seconds: root.length / fps,
-    positions: flat(placesOf(body)),
+    positions: flat(places),
     rotations: Float32Array.from(turns.flat(2)),
     root: Float32Array.from(root.flat()),
     features,
+    missed: misses,
     bvh: () => bvh(body),
   };
 }
