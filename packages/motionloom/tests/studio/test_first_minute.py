@@ -1,14 +1,12 @@
 """Somebody's first minute: from the opened page to a motion on their own character that follows a path, exported.
 
 Once with the mouse alone, once with the keyboard alone, counted in deeds of a hand; what the seconds were is printed
-(`pytest -s`). Then: the page has no fault that axe finds, and no task of it holds the page up while a motion is drawn.
+(`pytest -s`). Then: the page has no fault that axe finds.
 """
 
 import json
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,16 +18,7 @@ from tests.studio.studio import Studio
 
 MOST = 14
 """Deeds of a hand that it may take."""
-HELD_UP = 100.0
-"""Milliseconds of work in one task beyond which a page does not answer at once."""
 AXE = Path(__file__).parents[4] / "studio/node_modules/axe-core/axe.min.js"
-LONG = """() => { window.LONG = []; new PerformanceObserver(list => LONG.push(...list.getEntries().map(
-    one => one.duration))).observe({type: "longtask"}) }"""
-
-
-WORK = """() => new Promise(done => setTimeout(() => {
-    let sum = 0; for (let n = 0; n < 6e8; n += 1) sum += Math.sqrt(n); done(sum) }))"""
-"""A task that works for some tenths of a second on any machine."""
 
 
 class Hands:
@@ -170,42 +159,3 @@ def test_axe_finds_nothing(empty: Studio, theme: str):
     empty.key("Shift+P")
     page.set_viewport_size({"width": 1280, "height": 800})
     assert not any(found.values()), json.dumps(found, indent=1)
-
-
-def tasks(trace: bytes) -> list[float]:
-    """Milliseconds of work in each task of the page's own thread, without waiting, such as for software that draws."""
-    events: list[dict[str, Any]] = json.loads(trace)["traceEvents"]
-    threads = {(one["pid"], one["tid"]) for one in events if one.get("args", {}).get("name") == "CrRendererMain"}
-    return [
-        one["tdur"] / 1000
-        for one in events
-        if (one["pid"], one["tid"]) in threads and "tdur" in one and "RunTask" in one["name"]
-    ]
-
-
-def traced(studio: Studio, deed: Callable[[], None]) -> list[float]:
-    """Milliseconds of work of each of the page's tasks during a deed."""
-    browser = studio.page.context.browser
-    browser.start_tracing(page=studio.page, categories=["toplevel", "devtools.timeline"])
-    deed()
-    return tasks(browser.stop_tracing())
-
-
-def test_no_task_holds_the_page_up_while_it_draws(empty: Studio):
-    page = empty.page
-    page.evaluate(LONG)
-
-    def draw() -> None:
-        empty.key("r")
-        empty.drawn()
-
-    def work() -> None:
-        page.evaluate(WORK)
-
-    assert max(traced(empty, work)) > HELD_UP, "a task that is long is found"
-    page.evaluate("LONG.length = 0")
-    found = traced(empty, draw)
-    waited = page.evaluate("LONG")
-    assert len(found) > 100, "the trace has the page's tasks"
-    print(f"\nlongest task: {max(found):.0f} ms of work; long tasks on the clock: {[round(one) for one in waited]} ms")
-    assert max(found) <= HELD_UP
