@@ -17,6 +17,7 @@ from motionloom.weights.prior import Prior, read_tensors, save_prior
 from motionloom_train.control import ControlledError, train_control
 from motionloom_train.data.batches import Batches
 from motionloom_train.data.sets import load_set
+from motionloom_train.loop import Training
 from motionloom_train.low_rank import adapted, show
 from motionloom_train.masks import CONTROLS, NOTHING, draw_masks, some_frames
 from motionloom_train.modules import prior_module
@@ -42,7 +43,7 @@ def start(tmp_path_factory) -> str:
 def trained(data, out, start: str, *, stop: int | None = None, **changes):
     recipe = runs.recipe(**(PLAN | {"start": start} | changes))
     lines: list[str] = []
-    return train_control(recipe, data, out, text=tiny.text(), device="cpu", stop=stop, say=lines.append), lines
+    return train_control(Training(recipe, out, "cpu", stop, lines.append), data, tiny.text()), lines
 
 
 @pytest.mark.parametrize("control", CONTROLS)

@@ -191,7 +191,7 @@ def test_weights_are_written_though_the_run_was_stopped_just_before(tmp_path: Pa
         Sum(),
         runs.recipe(steps=5),
         tmp_path,
-        on_save=lambda net, average, step: saved.append(step),
+        on_save=lambda average, step: saved.append(step),
         on_step=lambda step, loss, s: steps.append(step),
     )
     assert saved == [5]

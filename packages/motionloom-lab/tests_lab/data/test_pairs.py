@@ -211,19 +211,6 @@ def test_crops_cover_the_pair_and_may_be_all_of_it():
             dp.crop(pair, start, frames)
 
 
-def test_random_crops_have_lengths_in_steps_of_four_and_reach_both_ends():
-    pair, rng = a_pair(42), np.random.default_rng(0)
-    crops = [dp.random_crop(pair, rng, shortest=20, longest=196) for _ in range(300)]
-    lengths = {c.frames for c in crops if c}
-    assert lengths == {20, 24, 28, 32, 36, 40}
-    starts = {int(np.abs(pair.positions[0, :, 0] - c.positions[0, 0, 0]).sum(-1).argmin()) for c in crops if c}
-    assert {0, 22} <= starts
-    whole = dp.random_crop(pair, rng, shortest=42, longest=42)
-    assert whole is not None
-    assert whole.frames == 42
-    assert dp.random_crop(pair, rng, shortest=43, longest=80) is None
-
-
 def test_a_mirrored_pair_has_mirrored_words_and_twice_is_itself():
     pair = a_pair()
     flip = dp.mirrored(pair)
@@ -233,12 +220,6 @@ def test_a_mirrored_pair_has_mirrored_words_and_twice_is_itself():
     np.testing.assert_array_equal(dp.mirrored(flip).positions, pair.positions)
     np.testing.assert_allclose(mp.distance(flip.positions), mp.distance(pair.positions))
     np.testing.assert_allclose(ph.heading(flip.positions[0]), -ph.heading(pair.positions[0]), atol=1e-9)
-
-
-def test_swapping_exchanges_the_people():
-    pair = a_pair()
-    np.testing.assert_array_equal(dp.swapped(pair).positions[0], pair.positions[1])
-    np.testing.assert_array_equal(dp.swapped(dp.swapped(pair)).positions, pair.positions)
 
 
 @pytest.mark.parametrize("wrong", ["one", "nan", "joints"])

@@ -15,6 +15,7 @@ from motionloom.weights.prior import save_prior
 from motionloom_lab.evaluator.net import load_embedder
 from motionloom_lab.evaluator.pairs import PairBatch, Pairs, backwards, contrary, negatives, opposed, senses
 from motionloom_lab.evaluator.training import config_of, contrast, train_evaluator
+from motionloom_train.loop import Training
 from motionloom_train.recipe import Recipe
 from tests.kinematics import people
 from tests.recorded import tiny
@@ -133,11 +134,9 @@ def test_a_batch_follows_from_seed_and_step(data: Path) -> None:
 
 def test_a_stopped_run_goes_on_with_the_same_losses(data: Path, tmp_path: Path) -> None:
     """Weights after a stop in the middle equal those of a run in one go, bit for bit; the file opens."""
-    whole = train_evaluator(recipe(), data, tmp_path / "a", text=tiny.text(), device="cpu", say=lambda line: None)
+    whole = train_evaluator(Training(recipe(), tmp_path / "a", "cpu", say=lambda line: None), data, tiny.text())
     for stop in (3, None):
-        parts = train_evaluator(
-            recipe(), data, tmp_path / "b", text=tiny.text(), device="cpu", stop=stop, say=lambda line: None
-        )
+        parts = train_evaluator(Training(recipe(), tmp_path / "b", "cpu", stop, lambda line: None), data, tiny.text())
     assert whole.read_bytes() == parts.read_bytes()
     made = load_embedder(whole, tiny.text())
     assert made.card["licence"] == "free"

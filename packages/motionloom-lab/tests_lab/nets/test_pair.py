@@ -18,8 +18,8 @@ from motionloom.runtime import pair as runtime_pair
 from motionloom.runtime.prior_condition import Bound as arrays_of
 from motionloom.weights import pair as pair_block
 from motionloom.weights.adapter import fingerprint
-from motionloom.weights.container import graph_tensors
-from motionloom.weights.pair import KEY, PairBlock, blocks
+from motionloom.weights.container import PAIRS, graph_tensors
+from motionloom.weights.pair import PairBlock, blocks
 from motionloom_lab.papers.commdm import adds_of, from_published_pair, is_pair
 from motionloom_lab.papers.published_priors import import_block
 from motionloom_train.export import pair_graph
@@ -343,11 +343,11 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
     }
     for number, (said, tensors) in enumerate(cases.values()):
         bad = tmp_path / f"{number}.safetensors"
-        save_file(tensors, bad, metadata={} if said is None else {KEY: json.dumps(said)})
+        save_file(tensors, bad, metadata={} if said is None else {PAIRS.key: json.dumps(said)})
         with pytest.raises(MotionloomError) as caught:
             PairBlock.load(bad, prior)  # type: ignore[arg-type]
         assert str(caught.value).count("\n") == 0
-    save_file(good | graph, tmp_path / "good.safetensors", metadata={KEY: json.dumps(about | {"config": sizes})})
+    save_file(good | graph, tmp_path / "good.safetensors", metadata={PAIRS.key: json.dumps(about | {"config": sizes})})
     PairBlock.load(tmp_path / "good.safetensors", prior)  # type: ignore[arg-type]
     (tmp_path / "cut.safetensors").write_bytes(path.read_bytes()[:-5])
     for name in ("cut.safetensors", "no-such-file"):

@@ -1,5 +1,6 @@
 """The multi-range transformer: exchange, places, its spectrum, seconds in a row, training and the file."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom_lab.papers.mrt import Mrt, MrtConfig, MrtFile, _nearness, completed
-from motionloom_lab.papers.mrt_training import Seconds, train_mrt
+from motionloom_lab.papers.mrt_training import RECIPE, Seconds, train_mrt
 from motionloom_train.data.pairs import Pair
+from motionloom_train.loop import Training
 
 TINY = MrtConfig(frames=6, width=16, hidden=24, layers=2, heads=2, key=8, dropout=0.0)
 
@@ -118,7 +120,7 @@ def test_a_network_that_says_the_truth_has_no_loss() -> None:
 def test_training_learns_and_the_file_comes_back(tmp_path: Path) -> None:
     pairs = [pair_of(30), pair_of(30, 1), pair_of(30, 2, "val")]
     said: list[str] = []
-    path = train_mrt(pairs, tmp_path, steps=60, batch=4, config=TINY, device="cpu", say=said.append)
+    path = train_mrt(Training(replace(RECIPE, steps=60, batch=4), tmp_path, "cpu", say=said.append), pairs, TINY)
     found = MrtFile.load(path)
     objective = Seconds(found.net, pairs[:1])
     fresh = Seconds(net_of(), pairs[:1])

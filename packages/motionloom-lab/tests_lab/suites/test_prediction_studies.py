@@ -180,9 +180,7 @@ def test_every_second_of_a_long_future_is_measured_alone(monkeypatch: pytest.Mon
     walks = np.stack([gliding(60), gliding(60)])
     walks[:, :, :, 0] = walks[:, :1, :, 0] + np.maximum(np.arange(60) - 30, 0)[:, None] / 30
     monkeypatch.setattr(behaviour, "long_futures", lambda *args, **given: np.stack([walks, walks]))
-    _, rows, about = behaviour.horizon(
-        predictor(), protocol(), windows=2, samples=2, seed=0, seconds=2, say=lambda line: None
-    )
+    _, rows, about = behaviour.horizon(behaviour.Study(predictor(), protocol(), windows=2, samples=2, seconds=2))
     assert [row.values["root_speed"].mean for row in rows[1:]] == pytest.approx([0, 1])
     assert [row.values["spread"].mean for row in rows[1:]] == pytest.approx([0, 0], abs=1e-6)
     assert rows[0].values["spread"].mean > 0.01
@@ -248,9 +246,7 @@ def test_what_is_held_comes_out_as_given(group: str) -> None:
 
 
 def test_a_switch_arrives_at_the_target_itself() -> None:
-    columns, rows, about = behaviour.arrive(
-        predictor(), protocol(), windows=2, samples=1, seed=0, seconds=0, say=lambda line: None
-    )
+    columns, rows, about = behaviour.arrive(behaviour.Study(predictor(), protocol(), windows=2, samples=1))
     assert [row.name for row in rows] == [REAL, "cut", "0.5 s", "1 s", "2 s"]
     assert all(row.values["target"].mean < 1e-6 for row in rows[2:])
     assert {c.name for c in columns} >= set(rows[2].values)
@@ -260,7 +256,7 @@ def test_a_switch_arrives_at_the_target_itself() -> None:
 def test_weights_of_another_skeleton_have_no_parts_to_hold() -> None:
     blind = predictor(layout=replace(protocol().layout, root=False))
     with pytest.raises(MotionloomError, match="22 joints"):
-        behaviour.hold(blind, protocol(), windows=1, samples=1, seed=0, seconds=1, say=lambda line: None)
+        behaviour.hold(behaviour.Study(blind, protocol(), windows=1, samples=1))
 
 
 def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:

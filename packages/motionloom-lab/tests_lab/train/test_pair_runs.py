@@ -11,6 +11,7 @@ from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, read_tensors, save_prior
 from motionloom_train.data.pairs import Pair
+from motionloom_train.loop import Training
 from motionloom_train.modules import pair_module
 from motionloom_train.pair import held_out, train_pair
 from tests.recorded import tiny
@@ -26,7 +27,7 @@ def start(tmp_path_factory) -> str:
 def trained(out, start: str, *, stop: int | None = None, pairs=None, **changes):
     lines: list[str] = []
     pairs = pairs or [pair(), pair("b", turn=2.0), pair("c", "val", turn=1.0)]
-    return train_pair(recipe(start=start, **changes), pairs, out, device="cpu", stop=stop, say=lines.append), lines
+    return train_pair(Training(recipe(start=start, **changes), out, "cpu", stop, lines.append), pairs), lines
 
 
 def test_a_stopped_run_goes_on_exactly_and_its_file_is_a_block_for_the_prior(start, tmp_path):

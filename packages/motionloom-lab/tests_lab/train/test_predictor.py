@@ -9,6 +9,7 @@ from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.weights.predictor import load_predictor
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom_train.data.prediction import Protocol, Recording
+from motionloom_train.loop import Training
 from motionloom_train.modules import predictor_module
 from motionloom_train.predictor import KINDS, Completion, Settings, Windows, new_predictor, train_predictor
 from motionloom_train.recipe import Recipe
@@ -139,30 +140,30 @@ def test_states_of_the_other_manner_are_standardised():
 
 def test_a_short_training_learns(tmp_path):
     lines: list[str] = []
-    train_predictor(recipe(steps=120, save_every=60), protocol(), tmp_path, device="cpu", say=lines.append)
+    train_predictor(Training(recipe(steps=120, save_every=60), tmp_path, "cpu", say=lines.append), protocol())
     losses = [float(line.rsplit(" ", 1)[1]) for line in lines if "held-out" in line]
     assert losses[-1] < 0.8 * losses[0]
 
 
 def test_a_run_that_was_stopped_goes_on_to_the_same_weights(tmp_path):
-    whole = train_predictor(recipe(), protocol(), tmp_path / "whole", device="cpu", say=lambda line: None)
-    train_predictor(recipe(), protocol(), tmp_path / "parts", device="cpu", stop=4, say=lambda line: None)
-    parts = train_predictor(recipe(), protocol(), tmp_path / "parts", device="cpu", say=lambda line: None)
+    whole = train_predictor(Training(recipe(), tmp_path / "whole", "cpu", say=lambda line: None), protocol())
+    train_predictor(Training(recipe(), tmp_path / "parts", "cpu", stop=4, say=lambda line: None), protocol())
+    parts = train_predictor(Training(recipe(), tmp_path / "parts", "cpu", say=lambda line: None), protocol())
     a, b = load_predictor(whole), load_predictor(parts)
     assert all(np.array_equal(x, y) for x, y in zip(a.net.weights.values(), b.net.weights.values(), strict=True))
     assert (a.card.notes["steps"], a.card.data, a.observed, a.frames) == (12, "free", 8, 20)
 
 
 def test_training_goes_on_from_another_file_and_refuses_other_windows(tmp_path):
-    first = train_predictor(recipe(), protocol(), tmp_path / "a", device="cpu", say=lambda line: None)
+    first = train_predictor(Training(recipe(), tmp_path / "a", "cpu", say=lambda line: None), protocol())
     more = train_predictor(
-        recipe(start=str(first), name="more"), protocol(), tmp_path / "b", device="cpu", say=lambda line: None
+        Training(recipe(start=str(first), name="more"), tmp_path / "b", "cpu", say=lambda line: None), protocol()
     )
     assert load_predictor(more).card.notes["from"] == "tiny"
     other = protocol()
     shorter = Protocol("s", 20.0, 8, 10, other.layout, other.recordings, "free")
     with pytest.raises(MotionloomError, match="other joints or windows"):
-        train_predictor(recipe(start=str(first)), shorter, tmp_path / "c", device="cpu", say=lambda line: None)
+        train_predictor(Training(recipe(start=str(first)), tmp_path / "c", "cpu", say=lambda line: None), shorter)
 
 
 @pytest.mark.parametrize(

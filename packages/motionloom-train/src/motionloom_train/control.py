@@ -6,7 +6,6 @@ The given numbers M of a state are thus signal * x_0, without noise. From a fini
 trained on (``full``, as published) or a low-rank adapter whose input also says what is given (`weights.adapter`).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from motionloom.weights.adapter import Adapter, fingerprint
 from motionloom.weights.prior import Card, Prior, save_prior
 from motionloom_train.data.batches import FAVOUR, Batches
 from motionloom_train.data.sets import MotionSet, load_set, read_clips
-from motionloom_train.loop import Average, Log, World, changed, train
+from motionloom_train.loop import Average, Training
 from motionloom_train.low_rank import AdapterNet, adapted, show, tensors_of
 from motionloom_train.masks import check_control, draw_masks
 from motionloom_train.modules import prior_module, prior_session
@@ -28,7 +27,7 @@ from motionloom_train.nets.prior import Condition, PriorNet
 from motionloom_train.objectives import CleanError, WordBank
 from motionloom_train.prior import restandardised
 from motionloom_train.recipe import Recipe
-from motionloom_train.tensors import conditions, find_device, noised, tensor
+from motionloom_train.tensors import conditions, noised, tensor
 
 HELD_WINDOW, HELD_ROWS = 80, 48
 """Frames and number of the held-out windows that are reported on."""
@@ -111,25 +110,14 @@ def held_out(data: Path | str, prior: Prior, recipe: Recipe) -> Held | None:
     return Held(clean, noised(prior.schedule, clean, level, noise * ~mask), mask, level, cond)
 
 
-def train_control(
-    recipe: Recipe,
-    data: Path | str,
-    folder: Path | str,
-    *,
-    text: TextEncoder,
-    device: str | None = None,
-    stop: int | None = None,
-    say: Callable[[str], None] = print,
-) -> Path:
-    """Train (or go on training) a control on a built set; returns the weight file ``folder/NAME.safetensors``.
+def train_control(run: Training, data: Path | str, text: TextEncoder) -> Path:
+    """Train (or go on training) a control on a built set; returns its weight file.
 
     An adapter for the prior ``recipe.start``, or with ``recipe.full`` a prior of its own. Raises MotionloomError for
     what cannot be trained.
     """
+    recipe, world = run.recipe, run.world
     check_control(recipe.control)
-    if device:
-        find_device(device)
-    world, folder = World.join(device), Path(folder)
     prior = Prior.load(recipe.start or "default")
     motions = restandardised(
         load_set(data, sources=recipe.sources, seed=recipe.seed), tensor(prior.mean), tensor(prior.std)
@@ -137,7 +125,7 @@ def train_control(
     torch.manual_seed(recipe.seed)
     net = _trained(recipe, prior, world.device)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
-    words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
+    words = WordBank(text, motions.texts, progress=run.progress)
     objective = ControlledError(
         net,
         prior.schedule,
@@ -148,26 +136,23 @@ def train_control(
         device=world.device,
     )
     objective.control, objective.early = recipe.control, recipe.spacing == "early"
-    held, place = held_out(data, prior, recipe), folder / f"{recipe.name}.safetensors"
-    say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(motions.items):,} described stretches")
-    for line in changed(folder, recipe) if world.rank == 0 else ():
-        say(f"going on with another recipe than before: {line}")
+    held = held_out(data, prior, recipe)
 
-    def export(_: nn.Module, average: Average, step: int) -> None:
+    def export(average: Average, step: int) -> None:
         weights = {k: v.cpu() for k, v in average.weights.items()}
         made = _full(recipe, prior, motions, weights, step) if recipe.full else None
         if made:
-            save_prior(made, place)
+            save_prior(made, run.place)
         else:
-            _adapter(recipe, prior, motions, weights, step).save(place)
+            _adapter(recipe, prior, motions, weights, step).save(run.place)
         if held:
             base = prior_module(prior)
-            now = prior_module(made) if made else adapted(base, Adapter.load(place, prior))
-            say(f"step {step}: {_report(held, now, base)}")
+            now = prior_module(made) if made else adapted(base, Adapter.load(run.place, prior))
+            run.say(f"step {step}: {_report(held, now, base)}")
 
-    log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=_wrap, on_save=export, on_step=log, stop=stop, say=say)
-    return place
+    count = sum(p.numel() for p in net.parameters())
+    about = f"{count:,} trained parameters, {len(motions.items):,} described stretches"
+    return run.run(objective, export, about, wrap=_wrap)
 
 
 def _wrap(net: nn.Module) -> nn.Module:

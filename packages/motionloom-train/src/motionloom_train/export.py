@@ -27,7 +27,7 @@ from motionloom.runtime.sizes import NetConfig
 from motionloom.runtime.text.minilm import HEAD_WIDTH
 from motionloom_train.nets.pair import PairNet, Talk
 from motionloom_train.nets.predictor import TransLinear
-from motionloom_train.nets.prior import Bound, PriorNet, condition
+from motionloom_train.nets.prior import Bound, Inner, PriorNet, condition
 from motionloom_train.nets.text.bert import Bert
 
 OPSET = 20
@@ -54,22 +54,17 @@ class PriorGraph(nn.Module):
         super().__init__()
         self.net = net
 
-    def forward(
-        self,
-        state: Tensor,
-        shown: Tensor,
-        level: Tensor,
-        text: Tensor,
-        keys: Tensor,
-        values: Tensor,
-        words: Tensor,
-        valid: Tensor,
-    ) -> Tensor:
-        """See `motionloom.runtime.prior.PriorSession` for the arguments."""
-        net, bound = self.net, _bound(text, keys, values, words)
-        tokens = net.embed(state) + shown
-        inner = net.begin(tokens, level, text, token_mask(net, valid))
-        return net.end(net.through(inner, bound))
+    def forward(self, *given: Tensor) -> Tensor:
+        """See `motionloom.runtime.prior.PriorSession` for the arguments, which are `inputs` in order."""
+        return self.net.end(self.net.through(*self.begin(self.net, *given)))
+
+    @staticmethod
+    def begin(net: PriorNet, *given: Tensor) -> tuple[Inner, Bound]:
+        """What the first block sees, and what the blocks attend to, of the eight `inputs`."""
+        state, shown, level, text, keys, values, words, valid = given
+        nothing = text.new_zeros(0)
+        bound = Bound(text, keys, values, words[:, None, None], nothing, nothing)
+        return net.begin(net.embed(state) + shown, level, text, token_mask(net, valid)), bound
 
     def example(self) -> tuple[Tensor, ...]:
         """Arguments of the right kinds; every axis that may vary has a length of its own."""
@@ -135,26 +130,12 @@ class PairGraph(nn.Module):
         self.register_buffer("mean", mean)
         self.register_buffer("std", std)
 
-    def forward(
-        self,
-        state: Tensor,
-        shown: Tensor,
-        level: Tensor,
-        text: Tensor,
-        keys: Tensor,
-        values: Tensor,
-        words: Tensor,
-        valid: Tensor,
-        frames: Tensor,
-        places: Tensor,
-        signal: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        """See `motionloom.runtime.pair.PairSession` for the arguments."""
-        net, bound = self.net, _bound(text, keys, values, words)
-        tokens = net.embed(state) + shown
-        inner = net.begin(tokens, level, text, token_mask(net, valid))
+    def forward(self, *given: Tensor) -> tuple[Tensor, Tensor]:
+        """See `motionloom.runtime.pair.PairSession` for the arguments, which are `inputs` in order."""
+        *one, frames, places, signal = given
+        inner, bound = PriorGraph.begin(self.net, *one)
         inner, place = self.pair[0].spoken(inner, bound, places, signal, frames, frames.shape[1])
-        return net.end(inner), place
+        return self.net.end(inner), place
 
     def example(self) -> tuple[Tensor, ...]:
         """Arguments of the right kinds."""
@@ -218,11 +199,6 @@ def token_mask(net: PriorNet, valid: Tensor) -> Tensor:
     if not net.modulated:
         valid = torch.cat([torch.ones_like(valid[:, :1]), valid], dim=1)
     return valid[:, None, None]
-
-
-def _bound(text: Tensor, keys: Tensor, values: Tensor, words: Tensor) -> Bound:
-    nothing = text.new_zeros(0)
-    return Bound(text, keys, values, words[:, None, None], nothing, nothing)
 
 
 def graph_bytes(module: Exported, names: Callable[[str], str] = str) -> bytes:

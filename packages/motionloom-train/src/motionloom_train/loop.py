@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from motionloom_train.captured import Captured
 from motionloom_train.objectives import Objective
 from motionloom_train.precision import choose
 from motionloom_train.recipe import Recipe
+from motionloom_train.tensors import find_device
 
 STATE = "state.safetensors"
 
@@ -54,6 +56,79 @@ class World:
         if device.startswith("cuda"):
             torch.cuda.set_device(device)
         return World(int(os.environ.get("RANK", "0")), size, device)
+
+
+@dataclass(frozen=True)
+class Training:
+    """One run of a recipe, whatever is trained."""
+
+    recipe: Recipe
+    folder: Path
+    """Holds the state, the weights, and what is logged."""
+    device: str | None = None
+    """Of PyTorch; None: a GPU where there is one."""
+    stop: int | None = None
+    """End early after so many steps."""
+    say: Callable[[str], None] = print
+    """Called with a line of progress now and then."""
+
+    @cached_property
+    def world(self) -> World:
+        """This process; raises MotionloomError for a device that is not there."""
+        if self.device:
+            find_device(self.device)
+        return World.join(self.device)
+
+    @property
+    def place(self) -> Path:
+        """The weight file that comes out."""
+        return self.folder / f"{self.recipe.name}.safetensors"
+
+    def progress(self, line: str) -> None:
+        """Say a line, in the first process alone."""
+        if self.world.rank == 0:
+            self.say(line)
+
+    def run(
+        self,
+        objective: "Objective",
+        export: Callable[["Average", int], None],
+        about: str,
+        *,
+        wrap: Callable[[nn.Module], nn.Module] = lambda net: net,
+        capture: bool = False,
+    ) -> Path:
+        """Train, or go on training; gives `place` back.
+
+        Args:
+            objective: what is minimised.
+            export: writes the weights of an average at a step, at every save.
+            about: what is trained, on what: said first.
+            wrap, capture: as of `train`.
+        """
+        self.say(about)
+        first = self.world.rank == 0
+        for line in changed(self.folder, self.recipe) if first else ():
+            self.say(f"going on with another recipe than before: {line}")
+        log = Log(self.folder, self.recipe, say=self.say) if first else None
+        train(
+            objective,
+            self.recipe,
+            self.folder,
+            world=self.world,
+            wrap=wrap,
+            on_save=export,
+            on_step=log,
+            capture=capture,
+            stop=self.stop,
+            say=self.say,
+        )
+        return self.place
+
+
+def compiled(recipe: Recipe, dynamic: bool | None = None) -> Callable[[nn.Module], nn.Module]:
+    """What compiles a network where the recipe says so; ``dynamic``: for shapes that change from step to step."""
+    return lambda net: torch.compile(net, dynamic=dynamic) if recipe.compile else net  # type: ignore[return-value]
 
 
 def rate_at(recipe: Recipe, step: int) -> float:
@@ -203,7 +278,7 @@ def train(
     *,
     world: World | None = None,
     wrap: Callable[[nn.Module], nn.Module] = lambda net: net,
-    on_save: Callable[[nn.Module, Average, int], None] | None = None,
+    on_save: Callable[[Average, int], None] | None = None,
     on_step: Callable[[int, float, float], None] | None = None,
     capture: bool = False,
     stop: int | None = None,
@@ -211,7 +286,7 @@ def train(
 ) -> Average:
     """Run a recipe in ``folder``, going on from the state found there; returns the averaged weights.
 
-    ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(net, average,
+    ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(average,
     step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``capture``: launch whole steps as graphs
     (`motionloom_train.captured`), in one process on a CUDA device, of an objective that allows it. ``stop``: end early
     after so many steps.
@@ -232,7 +307,7 @@ def train(
     net.train()
     last = min(recipe.steps, stop or recipe.steps)
     if done >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
-        on_save(net, average, done)
+        on_save(average, done)
     pace = Pace(done, last, say)
     losses: list[Tensor] = []
     seed, context = recipe.seed * 1_000_003 + world.rank, _context(recipe, world)
@@ -258,7 +333,7 @@ def train(
             if saves:
                 save_state(folder, net, average, optimizer, step=step + 1, recipe=recipe)
                 if on_save:
-                    on_save(net, average, step + 1)
+                    on_save(average, step + 1)
                 began = time.perf_counter()
     return average
 

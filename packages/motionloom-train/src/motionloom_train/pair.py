@@ -6,17 +6,17 @@ people's free numbers (published: one person's, over all of them), over the plac
 them decided, over where each sees the other's pelvis, head and wrists (ours).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, LAYOUT
+from motionloom.features.layout import FPS
 from motionloom.goals.roles import without_two
 from motionloom.runtime.text.known import known_sentences
 from motionloom.weights.adapter import fingerprint
@@ -25,13 +25,13 @@ from motionloom.weights.prior import Prior
 from motionloom_train.data.pairs import Pair
 from motionloom_train.duets import Crops, Duets, Sight
 from motionloom_train.export import pair_graph
-from motionloom_train.loop import STATE, Average, Log, World, changed, train
+from motionloom_train.loop import STATE, Average, Training, compiled
 from motionloom_train.modules import arrays, pair_module, prior_module
 from motionloom_train.nets.pair import PLACE, PairConfig, PairNet, Talk, fitting, join, part
 from motionloom_train.nets.prior import Condition
-from motionloom_train.objectives import WEIGHTS, WordBank, displacement_error
-from motionloom_train.recipe import Recipe
-from motionloom_train.tensors import find_device, noised, tensor
+from motionloom_train.objectives import WordBank, displacement_error, feature_scale
+from motionloom_train.recipe import Recipe, parse_table
+from motionloom_train.tensors import noised, tensor
 
 BEGUN, LONGEST_BEGUN, SHORTEST_BEGUN = 20, 40, 10
 """Frames of a given beginning: the commonest, the most and the fewest."""
@@ -66,15 +66,7 @@ class Settings:
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values out of range."""
-        hints = get_type_hints(Settings)
-        for key, value in values.items():
-            if key not in hints:
-                known = ", ".join(f.name for f in fields(Settings))
-                raise MotionloomError(f"[pair] has no setting {key!r}; the settings are {known}")
-            fits = isinstance(value, (int, float) if hints[key] is float else hints[key])
-            if not fits or (hints[key] is not bool and isinstance(value, bool)):
-                raise MotionloomError(f"[pair] {key} must be of kind {hints[key].__name__}; got {value!r}")
-        made = Settings(**values)
+        made = parse_table(Settings, "pair", values)
         shares = (made.prefix, made.react, made.prefix + made.react, made.silent, made.early, made.faint)
         if not all(0 <= share <= 1 for share in shares) or not all(0 <= w <= 1e3 for w in (made.place, made.sight)):
             raise MotionloomError("[pair] prefix, react, silent, early and faint are shares, place and sight weights")
@@ -122,10 +114,7 @@ class PairError:
         self.mean, self.std = tensor(prior.mean, device), tensor(prior.std, device)
         self.words = WordBank(prior.text, duets.texts, progress=lambda line: None)
         self.sight = Sight(net.talk.config.places)
-        scale = torch.ones_like(self.mean)
-        for name, block in LAYOUT.items():
-            scale[block] = WEIGHTS[name]
-        self.scale = scale / scale.mean()
+        self.scale = feature_scale().to(self.mean)
         self.shares = settings.faint + (1 - settings.faint) * tensor(self.schedule.alpha_bar).to(self.mean)
 
     @property
@@ -273,47 +262,29 @@ def held_out(objective: PairError, pairs: Sequence[Pair]) -> Held | None:
 # A run ---------------------------------------------------------------------------------------------------------------
 
 
-def train_pair(
-    recipe: Recipe,
-    pairs: Sequence[Pair],
-    folder: Path | str,
-    *,
-    device: str | None = None,
-    stop: int | None = None,
-    say: Callable[[str], None] = print,
-) -> Path:
-    """Train (or go on training) a block for the prior ``recipe.start``; returns ``folder/NAME.safetensors``.
+def train_pair(run: Training, pairs: Sequence[Pair]) -> Path:
+    """Train (or go on training) a block for the prior ``start`` of the recipe; returns its weight file.
 
     That file holds the averaged weights of the saved step that did best on the pairs for validation (without such
-    pairs the last), and ``folder/last.safetensors`` those of the last. ``recipe.batch`` counts pairs.
+    pairs the last), and ``folder/last.safetensors`` those of the last. A recipe's ``batch`` counts pairs.
 
     Raises MotionloomError for settings that cannot be, and pairs that are all too short, or all for tests, or that
     nobody described where a share of the samples is drawn from a text alone.
     """
-    if device:
-        find_device(device)
-    world, folder = World.join(device), Path(folder)
+    recipe, device = run.recipe, run.world.device
     settings = Settings.parse(recipe.pair)
     prior = Prior.load(recipe.start or "default")
     seen = _usable([pair for pair in pairs if pair.split == "train"], recipe, settings)
     torch.manual_seed(recipe.seed)
     config = settings.config(prior)
-    mean, std = tensor(prior.mean, world.device), tensor(prior.std, world.device)
-    base, talk = prior_module(prior).to(world.device), Talk(config, prior.net.config).to(world.device)
+    mean, std = tensor(prior.mean, device), tensor(prior.std, device)
+    base, talk = prior_module(prior).to(device), Talk(config, prior.net.config).to(device)
     net = PairNet(base, talk, prior.schedule, mean=mean, std=std)
-    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe, device=world.device)
+    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe, device=device)
     seconds = sum(pair.frames for pair in seen) / FPS
-    say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(seen)} pairs of {seconds:.0f} s")
-    for line in changed(folder, recipe) if world.rank == 0 else ():
-        say(f"going on with another recipe than before: {line}")
-    export = _Export(recipe, prior, config, held_out(objective, pairs), seen, folder=folder, say=say)
-    log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop, say=say)
-    return export.place
-
-
-def _wrap(recipe: Recipe) -> Callable[[nn.Module], nn.Module]:
-    return lambda net: torch.compile(net, dynamic=True) if recipe.compile else net  # type: ignore[return-value]
+    about = f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(seen)} pairs of {seconds:.0f} s"
+    export = _Export(run, prior, config, held_out(objective, pairs), seen)
+    return run.run(objective, export, about, wrap=compiled(recipe, dynamic=True))
 
 
 def _usable(pairs: Sequence[Pair], recipe: Recipe, settings: Settings) -> list[Pair]:
@@ -339,44 +310,35 @@ class _Export:
     """Writes the weights at every save, and those that do best on the held-out pairs under the run's name."""
 
     def __init__(
-        self,
-        recipe: Recipe,
-        prior: Prior,
-        config: PairConfig,
-        held: Held | None,
-        pairs: Sequence[Pair],
-        *,
-        folder: Path,
-        say: Callable[[str], None],
+        self, run: Training, prior: Prior, config: PairConfig, held: Held | None, pairs: Sequence[Pair]
     ) -> None:
-        self.recipe, self.prior, self.config, self.held, self.say = recipe, prior, config, held, say
-        self.place, self.last = folder / f"{recipe.name}.safetensors", folder / "last.safetensors"
+        self.run, self.prior, self.config, self.held = run, prior, config, held
         self.licences = "; ".join(sorted({pair.licence for pair in pairs}))
         self.names = [pair.name for pair in pairs]
         texts = [without_two(text) for pair in pairs for text in pair.captions]
         self.known = known_sentences(texts, {}, prior.text) if texts else None
         self.digest = fingerprint(prior.net)
-        going_on = (folder / STATE).is_file() and self.place.is_file()
-        self.best = _loss_of(PairBlock.load(self.place, prior)) if going_on and held else float("inf")
+        going_on = (run.folder / STATE).is_file() and run.place.is_file()
+        self.best = _loss_of(PairBlock.load(run.place, prior)) if going_on and held else float("inf")
         self.fresh = held.report(pair_module(self._block({}, 0), prior)) if held else None
 
-    def __call__(self, _: nn.Module, average: Average, step: int) -> None:
+    def __call__(self, average: Average, step: int) -> None:
         weights = {key.removeprefix("talk."): value.cpu().numpy() for key, value in average.weights.items()}
         block = self._block(weights, step)
         now = self.held.report(pair_module(block, self.prior)) if self.held else None
         if now:
             block.notes.update(held_out=asdict(now), fresh=asdict(self.fresh) if self.fresh else {})
-        block.save(self.last)
+        block.save(self.run.folder / "last.safetensors")
         better = now is None or now.loss < self.best
         if better:
             self.best = now.loss if now else self.best
-            block.save(self.place)
+            block.save(self.run.place)
         if now:
             best = " (the best so far)" if better else ""
-            self.say(f"step {step}: held-out pairs: loss {now.loss:.4f}, {now}; fresh block: {self.fresh}{best}")
+            self.run.say(f"step {step}: held-out pairs: loss {now.loss:.4f}, {now}; fresh block: {self.fresh}{best}")
 
     def _block(self, weights: dict[str, np.ndarray], step: int) -> PairBlock:
-        recipe = self.recipe
+        recipe = self.run.recipe
         weights = weights or arrays(Talk(self.config, self.prior.net.config))
         notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "pairs": self.names}
         return PairBlock(

@@ -6,10 +6,9 @@ Variant `masked` trains one network for every mask: most rows are given a past, 
 joints or the root's path in the future.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_type_hints
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -23,11 +22,11 @@ from motionloom.runtime.predictor import PredictorConfig
 from motionloom.weights.predictor import Predictor, condition_shape, find_predictor, load_predictor, save_predictor
 from motionloom.weights.prior import Card
 from motionloom_train.data.prediction import Protocol, Recording
-from motionloom_train.loop import Average, Log, World, changed, train
+from motionloom_train.loop import Average, Training, compiled
 from motionloom_train.modules import predictor_module, predictor_session
 from motionloom_train.nets.predictor import TransLinear
-from motionloom_train.recipe import Recipe
-from motionloom_train.tensors import find_device, noised, tensor
+from motionloom_train.recipe import Recipe, parse_table
+from motionloom_train.tensors import noised, tensor
 
 WHOLE_PAST = 0.75
 """How often all of the past is given; else its last 2 frames or more."""
@@ -37,7 +36,7 @@ the root's path in the future; some joints in some stretches."""
 STATISTICS = 4096
 """Windows that mean and spread are measured on."""
 HELD = 256
-"""Old names of settings; the variant ``told`` is ``masked`` now."""
+"""Held-out windows of a report."""
 
 
 @dataclass(frozen=True)
@@ -62,16 +61,7 @@ class Settings:
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values of the wrong kind."""
-        hints = get_type_hints(Settings)
-        for key, value in values.items():
-            if key not in hints:
-                known = ", ".join(f.name for f in fields(Settings))
-                raise MotionloomError(f"[predictor] has no setting {key!r}; the settings are {known}")
-            kind = str if key == "variant" else hints[key]
-            fits = isinstance(value, (int, float) if kind is float else kind)
-            if not fits or (kind is not bool and isinstance(value, bool)):
-                raise MotionloomError(f"[predictor] {key} must be of kind {kind.__name__}; got {value!r}")
-        settings = Settings(**values)
+        settings = parse_table(Settings, "predictor", values)
         shares = 0 <= settings.condition_dropout < 1 and 0 <= settings.smoothed <= 1
         if settings.variant not in ("published", "masked") or not shares:
             raise MotionloomError(
@@ -249,22 +239,12 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
     return replace(predictor, mean=state.mean(0), std=state.std(0, ddof=1).clip(min=1e-4))
 
 
-def train_predictor(
-    recipe: Recipe,
-    protocol: Protocol,
-    folder: Path | str,
-    *,
-    device: str | None = None,
-    stop: int | None = None,
-    say: Callable[[str], None] = print,
-) -> Path:
-    """Train (or go on training) a predictor on a data set; returns the weight file ``folder/NAME.safetensors``.
+def train_predictor(run: Training, protocol: Protocol) -> Path:
+    """Train (or go on training) a predictor on a data set; returns its weight file.
 
     Raises MotionloomError for settings that cannot be and data too short for one window.
     """
-    if device:
-        find_device(device)
-    world, folder = World.join(device), Path(folder)
+    recipe, device = run.recipe, run.world.device
     settings = Settings.parse(recipe.predictor)
     windows = Windows(protocol.split("train"), protocol, variant=settings.variant, smoothed=settings.smoothed)
     torch.manual_seed(recipe.seed)
@@ -278,27 +258,18 @@ def train_predictor(
         predictor = new_predictor(protocol, settings, windows, schedule=recipe.schedule, levels=recipe.levels)
     net = predictor_module(predictor).requires_grad_(True)
     minutes = windows.lengths.sum() / protocol.fps / 60
-    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {minutes:.0f} minutes recorded")
-    for line in changed(folder, recipe) if world.rank == 0 else ():
-        say(f"going on with another recipe than before: {line}")
     dropout = settings.condition_dropout
-    objective = Completion(net, predictor, windows, condition_dropout=dropout, device=world.device)
-    place = folder / f"{recipe.name}.safetensors"
+    objective = Completion(net, predictor, windows, condition_dropout=dropout, device=device)
     held = _held(protocol, settings)
 
-    def export(_: nn.Module, average: Average, step: int) -> None:
+    def export(average: Average, step: int) -> None:
         made = _finished(predictor, recipe, protocol, average, step=step, minutes=minutes)
-        save_predictor(made, place)
+        save_predictor(made, run.place)
         if held is not None:
-            say(f"step {step}: held-out loss {_held_loss(made, held, settings):.4f}")
+            run.say(f"step {step}: held-out loss {_held_loss(made, held, settings):.4f}")
 
-    log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop, say=say)
-    return place
-
-
-def _wrap(recipe: Recipe) -> Callable[[nn.Module], nn.Module]:
-    return lambda net: torch.compile(net) if recipe.compile else net  # type: ignore[return-value]
+    about = f"{sum(p.numel() for p in net.parameters()):,} parameters, {minutes:.0f} minutes recorded"
+    return run.run(objective, export, about, wrap=compiled(recipe))
 
 
 def _held(protocol: Protocol, settings: Settings) -> Windows | None:

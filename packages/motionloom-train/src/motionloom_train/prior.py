@@ -1,6 +1,5 @@
 """Training a prior from a recipe: the data, the network, the text encoder, and the weight file that comes out."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,29 +21,18 @@ from motionloom.weights.prior import (
 from motionloom_train.data.batches import FAVOUR, Batches
 from motionloom_train.data.sets import MotionSet, load_set
 from motionloom_train.known import known_table
-from motionloom_train.loop import Average, Log, World, changed, train
+from motionloom_train.loop import Average, Training
 from motionloom_train.modules import prior_module, prior_session
 from motionloom_train.modules import text_encoder as embedded
 from motionloom_train.nets.prior import NetConfig, PriorNet
 from motionloom_train.objectives import CleanError, Conditioned, WordBank
 from motionloom_train.recipe import Recipe
-from motionloom_train.tensors import find_device, tensor
+from motionloom_train.tensors import tensor
 
 
-def train_prior(
-    recipe: Recipe,
-    data: Path | str,
-    folder: Path | str,
-    *,
-    text: TextEncoder,
-    device: str | None = None,
-    stop: int | None = None,
-    say: Callable[[str], None] = print,
-) -> Path:
-    """Train (or go on training) a prior on a built set; returns the weight file ``folder/NAME.safetensors``."""
-    if device:
-        find_device(device)
-    world, folder = World.join(device), Path(folder)
+def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
+    """Train (or go on training) a prior on a built set; returns its weight file."""
+    recipe, world = run.recipe, run.world
     motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
     torch.manual_seed(recipe.seed)
     net = PriorNet(NetConfig.parse(recipe.net))
@@ -59,7 +47,7 @@ def train_prior(
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     motions = replace(motions, features=motions.features.to(world.device))
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
-    words = WordBank(text, motions.texts, device=world.device, progress=say if world.rank == 0 else lambda line: None)
+    words = WordBank(text, motions.texts, device=world.device, progress=run.progress)
     objective = CleanError(
         net,
         schedule,
@@ -71,16 +59,13 @@ def train_prior(
         heights=recipe.heights,
         device=world.device,
     )
-    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {_size(motions)}")
-    for line in changed(folder, recipe) if world.rank == 0 else ():
-        say(f"going on with another recipe than before: {line}")
-    place, known = folder / f"{recipe.name}.safetensors", known_table(motions, text)
+    known = known_table(motions, text)
 
-    def export(_: nn.Module, average: Average, step: int) -> None:
+    def export(average: Average, step: int) -> None:
         prior = replace(_prior(recipe, motions, average, step, text), known=known)
-        save_prior(prior, place)
+        save_prior(prior, run.place)
         if recipe.show_every and step % recipe.show_every == 0:
-            _show(prior, recipe, folder / f"step_{step:07d}.png")
+            _show(prior, recipe, run.folder / f"step_{step:07d}.png")
 
     capture = recipe.compile and world.size == 1 and world.device.startswith("cuda")
 
@@ -90,27 +75,11 @@ def train_prior(
         # sentences have many lengths
         return torch.compile(called, dynamic=True) if recipe.compile and not capture else called  # type: ignore[return-value]
 
-    log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(
-        objective,
-        recipe,
-        folder,
-        world=world,
-        wrap=wrap,
-        on_save=export,
-        on_step=log,
-        capture=capture,
-        stop=stop,
-        say=say,
+    about = (
+        f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
+        f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded"
     )
-    return place
-
-
-def _size(motions: MotionSet) -> str:
-    return (
-        f"{len(motions.items):,} described stretches, {len(motions.texts):,} sentences, "
-        f"{motions.minutes:.0f} minutes recorded"
-    )
+    return run.run(objective, export, about, wrap=wrap, capture=capture)
 
 
 def restandardised(motions: MotionSet, mean: Tensor, std: Tensor) -> MotionSet:

@@ -5,7 +5,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, Literal, TypeVar, get_origin, get_type_hints
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
@@ -118,6 +118,26 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
     recipe = Recipe(**values)
     _check(path, recipe)
     return recipe
+
+
+Table = TypeVar("Table")
+
+
+def parse_table(kind: type[Table], name: str, values: dict[str, Any]) -> Table:
+    """Settings of a dataclass from a recipe's table of that name.
+
+    Raises MotionloomError for a setting there is not, and for a value of the wrong kind; words are checked by whoever
+    knows which there are.
+    """
+    hints = get_type_hints(kind)
+    for key, value in values.items():
+        if key not in hints:
+            raise MotionloomError(f"[{name}] has no setting {key!r}; the settings are {', '.join(hints)}")
+        wanted = str if get_origin(hints[key]) is Literal else hints[key]
+        fits = isinstance(value, (int, float) if wanted is float else wanted)
+        if not fits or (wanted is not bool and isinstance(value, bool)):
+            raise MotionloomError(f"[{name}] {key} must be of kind {wanted.__name__}; got {value!r}")
+    return kind(**values)
 
 
 LIMITS: Mapping[str, float] = {

@@ -30,7 +30,7 @@ from motionloom_train.loop import Average, World, train
 from motionloom_train.low_rank import AdapterNet, tensors_of
 from motionloom_train.modules import prior_module
 from motionloom_train.nets.prior import Condition
-from motionloom_train.objectives import WEIGHTS, Conditioned, WordBank, displacement_error, masked_error
+from motionloom_train.objectives import Conditioned, WordBank, displacement_error, feature_scale, masked_error
 from motionloom_train.precision import CHOICES, choose
 from motionloom_train.recipe import Recipe
 from motionloom_train.tensors import find_device, noised, tensor
@@ -192,10 +192,7 @@ class Teaching:
         self.prompts = [self.numbers[prompt] for prompt, _ in drawn]
         self.others = [self.numbers[prompt] for prompt in others]
         self.words = WordBank(prior.text, tuple(texts), progress=lambda line: None)
-        scale = torch.ones(len(prior.mean))
-        for name, block in LAYOUT.items():
-            scale[block] = WEIGHTS[name]
-        self.scale = (scale / scale.mean()).to(self.device)
+        self.scale = feature_scale().to(self.device)
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `motionloom_train.objectives.Objective`."""

@@ -15,9 +15,9 @@ def tensor(array: np.ndarray, device: str | torch.device = "cpu") -> Tensor:
     return torch.from_numpy(np.array(array)).to(device)
 
 
-def conditions(cond: prior_condition.Condition, device: str | torch.device = "cpu") -> Condition:
+def conditions(cond: prior_condition.Condition) -> Condition:
     """A condition for a module."""
-    return Condition(*(tensor(part, device) for part in cond))
+    return Condition(*(tensor(part) for part in cond))
 
 
 def noised(schedule: Schedule, clean: Tensor, level: Tensor, noise: Tensor) -> Tensor:

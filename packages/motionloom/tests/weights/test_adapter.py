@@ -11,7 +11,8 @@ from motionloom.diffusion import join_rows
 from motionloom.errors import MotionloomError
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound, condition
-from motionloom.weights.adapter import GIVEN, KEY, Adapter, adapted, adapters, layers, show
+from motionloom.weights.adapter import GIVEN, Adapter, adapted, adapters, layers, show
+from motionloom.weights.container import ADAPTERS
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 from tests.recorded.tiny import WIDTH
@@ -131,7 +132,9 @@ def test_descriptions_of_another_kind_are_refused(tmp_path, change):
     written = control_adapter(prior)
     about = {k: getattr(written, k) for k in ("name", "control", "base", "fingerprint", "licence", "data", "rank")}
     save_file(
-        dict(written.tensors), tmp_path / "a.safetensors", metadata={KEY: json.dumps(about | {"format": 1} | change)}
+        dict(written.tensors),
+        tmp_path / "a.safetensors",
+        metadata={ADAPTERS.key: json.dumps(about | {"format": 1} | change)},
     )
     refused(tmp_path / "a.safetensors", prior, "adapter")
 

@@ -23,7 +23,6 @@ from motionloom_lab.bench.speed import (
     Process,
     Sampling,
     commands,
-    defaults,
     efficiency,
     linearity,
     process,
@@ -31,7 +30,7 @@ from motionloom_lab.bench.speed import (
 )
 from motionloom_lab.bench.start import starts
 
-__all__ = ["Entry", "Process", "Sampling", "bench", "bench_prediction", "defaults", "machine", "process", "table"]
+__all__ = ["Entry", "Process", "Sampling", "bench", "bench_prediction", "machine", "process", "table"]
 
 
 def bench(

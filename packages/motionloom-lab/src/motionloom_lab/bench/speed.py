@@ -1,6 +1,5 @@
 """Tools that time and weigh, and what `generate` costs."""
 
-import inspect
 import os
 import re
 import subprocess
@@ -51,17 +50,6 @@ class Sampling:
     steps: int = STEPS
     guidance: float = GUIDANCE
     solver: Solver = SOLVERS[SOLVER]
-
-
-def defaults(function: Callable[..., Any]) -> Sampling:
-    """The defaults in the signature of ``function`` (`tasks.text.generate`)."""
-    found = {n: p.default for n, p in inspect.signature(function).parameters.items() if p.default is not p.empty}
-    solver = found.get("solver", Sampling.solver)
-    return Sampling(
-        int(found.get("steps") or Sampling.steps),
-        float(found.get("guidance") or Sampling.guidance),
-        SOLVERS[solver] if isinstance(solver, str) else solver or Sampling.solver,
-    )
 
 
 def guided(prior: Prior, rows: int, *, guidance: float) -> Denoiser:
@@ -183,16 +171,10 @@ def _call(denoise: Denoiser, x: np.ndarray, level: int) -> Callable[[], None]:
 
 def fit(counts: Sequence[float], times: Sequence[float]) -> tuple[float, float, float]:
     """Least-squares line: slope, value at 0, and the share of variance it explains."""
-    x, y = torch.tensor(counts, dtype=torch.float64), torch.tensor(times, dtype=torch.float64)
-    dx, dy = x - x.mean(), y - y.mean()
-    slope = float((dx * dy).sum() / (dx * dx).sum())
-    rest = dy - slope * dx
-    spread = float((dy * dy).sum())
-    return (
-        slope,
-        float(y.mean()) - slope * float(x.mean()),
-        1.0 - float((rest * rest).sum()) / spread if spread else 1.0,
-    )
+    slope, start = np.polyfit(counts, times, 1)
+    spread = np.var(times)
+    rest = np.var(np.asarray(times) - slope * np.asarray(counts))
+    return float(slope), float(start), float(1.0 - rest / spread) if spread else 1.0
 
 
 @dataclass(frozen=True)

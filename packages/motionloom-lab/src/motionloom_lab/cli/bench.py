@@ -62,16 +62,14 @@ def _weights(arguments: argparse.Namespace) -> str:
 
 
 def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
-    from motionloom.tasks.long import compose
-    from motionloom.tasks.text import generate
     from motionloom.weights.prior import Prior
-    from motionloom_lab.bench import bench, defaults
+    from motionloom_lab.bench import Sampling, bench
     from motionloom_lab.suites.harness import say
 
     weights = arguments.weights or "default"
     return bench(
         Prior.load(weights, device=arguments.device),
-        defaults(compose if arguments.long else generate),
+        Sampling(),
         what="long" if arguments.long else "short",
         quick=arguments.quick,
         weights=weights,

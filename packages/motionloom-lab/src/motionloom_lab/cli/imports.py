@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,7 +38,6 @@ def add(subparsers) -> None:
 
 
 def _import(arguments: argparse.Namespace) -> None:
-    from motionloom.errors import MotionloomError
     from motionloom.io.atomic import check_place
     from motionloom.weights.prior import save_prior
     from motionloom_lab.papers.commdm import is_pair
@@ -88,7 +88,6 @@ def _imported_block(arguments: argparse.Namespace, prior: "Prior") -> "PairBlock
 
 
 def _import_predictor(arguments: argparse.Namespace) -> None:
-    from motionloom.errors import MotionloomError
     from motionloom.weights.predictor import save_predictor
     from motionloom_lab.papers.humanmac_checkpoint import import_humanmac
 
@@ -99,7 +98,6 @@ def _import_predictor(arguments: argparse.Namespace) -> None:
 
 
 def _import_evaluator(arguments: argparse.Namespace) -> None:
-    from motionloom.errors import MotionloomError
     from motionloom_lab.papers.guo import read_published, save_guo
 
     if arguments.half:
@@ -120,7 +118,6 @@ def _import_evaluator(arguments: argparse.Namespace) -> None:
 
 def _numbers(path: Path) -> "np.ndarray":
     """A small .npy array of numbers, without pickle."""
-    from motionloom.errors import MotionloomError
     from motionloom.io.npz import read_array
 
     if not path.is_file():

@@ -60,7 +60,7 @@ def score(
     return Scored(np.array(prompts), np.array(obeyed), far)
 
 
-def within_prompts(scored: Sequence[Scored], *, repeats: int = 1000, seed: int = 0) -> Value:
+def within_prompts(scored: Sequence[Scored]) -> Value:
     """Chance that an obeying motion is nearer to its prompt than a disobeying one of the same prompt, all pooled.
 
     The interval is that of the mean over prompts, by drawing the prompts that have both kinds anew (bootstrap).
@@ -77,7 +77,7 @@ def within_prompts(scored: Sequence[Scored], *, repeats: int = 1000, seed: int =
     if not pairs:
         return Value(float("nan"))
     won, of = np.array(wins), np.array(pairs)
-    drawn = np.random.default_rng(seed).integers(len(of), size=(repeats, len(of)))
+    drawn = np.random.default_rng(0).integers(len(of), size=(1000, len(of)))
     spread = (won[drawn].sum(1) / of[drawn].sum(1)).std()
     return Value(float(won.sum() / of.sum()), float(1.96 * spread), len(of))
 

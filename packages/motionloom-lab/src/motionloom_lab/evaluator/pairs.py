@@ -198,7 +198,7 @@ def _take(name: str) -> str:
     return re.sub(r"_(looped|reversed|bent\d*)$", "", name)
 
 
-def negatives(batch: PairBatch, pooled: Tensor, directions: Tensor, *, alike: float = ALIKE) -> Tensor:
+def negatives(batch: PairBatch, pooled: Tensor, directions: Tensor) -> Tensor:
     """(rows, rows) bool: True where motion j is a negative of sentence i.
 
     pooled, directions: (sentences, width) and `senses` of all sentences. Not negatives: the same measured label, the
@@ -206,6 +206,6 @@ def negatives(batch: PairBatch, pooled: Tensor, directions: Tensor, *, alike: fl
     """
     texts = batch.texts[: batch.rows]
     said = torch.nn.functional.normalize(pooled[texts].float(), dim=-1)
-    apart = (said @ said.T < alike) | opposed(directions[texts], directions[texts])
+    apart = (said @ said.T < ALIKE) | opposed(directions[texts], directions[texts])
     same = (batch.groups[:, None] == batch.groups) | (batch.takes[:, None] == batch.takes)
     return apart & ~same

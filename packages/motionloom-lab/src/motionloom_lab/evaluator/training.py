@@ -1,6 +1,5 @@
 """Training the own evaluator: the contrastive objective, and the file that comes out."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ from torch.nn import functional as F
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.runtime.text.protocol import TextEncoder
-from motionloom.weights.prior import find_device
 from motionloom_lab.evaluator.net import (
     INPUTS,
     Embedder,
@@ -23,7 +21,7 @@ from motionloom_lab.evaluator.net import (
     text_digest,
 )
 from motionloom_lab.evaluator.pairs import Pairs, negatives, senses
-from motionloom_train.loop import Average, Log, World, train
+from motionloom_train.loop import Average, Training
 from motionloom_train.objectives import WordBank
 from motionloom_train.recipe import Recipe
 
@@ -83,11 +81,11 @@ def contrast(ask: Tensor, answer: Tensor, hard: Tensor, owner: Tensor, allowed: 
     return torch.cat([main, last[:, None]], dim=1)
 
 
-def input_statistics(pairs: Pairs, *, count: int = 1500, seed: int = 0) -> tuple[Tensor, Tensor]:
-    """Mean (INPUTS,) and spread, one per block, of what the network reads of at most ``count`` windows of the set."""
+def input_statistics(pairs: Pairs, *, seed: int) -> tuple[Tensor, Tensor]:
+    """Mean (INPUTS,) and spread, one per block, of what the network reads of at most 1500 windows of the set."""
     rng = np.random.default_rng(seed)
     parts = []
-    for number in rng.integers(len(pairs.data.items), size=min(count, 20 * len(pairs.data.items))):
+    for number in rng.integers(len(pairs.data.items), size=min(1500, 20 * len(pairs.data.items))):
         shown = torch.from_numpy(pairs.window(pairs.data.items[number], rng))[None].double()
         parts.append(inputs(shown, torch.tensor([shown.shape[1]]))[0])
     seen = torch.cat(parts)
@@ -97,21 +95,10 @@ def input_statistics(pairs: Pairs, *, count: int = 1500, seed: int = 0) -> tuple
     return mean.float(), std.float()
 
 
-def train_evaluator(
-    recipe: Recipe,
-    data: Path | str,
-    folder: Path | str,
-    *,
-    text: TextEncoder,
-    device: str | None = None,
-    stop: int | None = None,
-    say: Callable[[str], None] = print,
-) -> Path:
-    """Train (or go on training) an evaluator on a built set; returns the file ``folder/NAME.safetensors``."""
-    if device:
-        find_device(device)
+def train_evaluator(run: Training, data: Path | str, text: TextEncoder) -> Path:
+    """Train (or go on training) an evaluator on a built set; returns its file."""
+    recipe, device = run.recipe, run.world.device
     text_digest(text)
-    world, folder = World.join(device), Path(folder)
     config = config_of(recipe, text)
     pairs = Pairs.load(data, sources=recipe.sources, seed=recipe.seed)
     if pairs.data.features.shape[1] != WIDTH:
@@ -119,25 +106,22 @@ def train_evaluator(
     torch.manual_seed(recipe.seed)
     net = EvaluatorNet(config)
     mean, std = input_statistics(pairs, seed=recipe.seed)
-    words = WordBank(text, pairs.texts, room=64, progress=say if world.rank == 0 else lambda line: None)
-    objective = Contrast(net, pairs, words, mean, std, device=world.device)
-    say(
+    words = WordBank(text, pairs.texts, room=64, progress=run.progress)
+    objective = Contrast(net, pairs, words, mean, std, device=device)
+    about = (
         f"{sum(p.numel() for p in net.parameters()):,} parameters of {INPUTS} inputs, {len(pairs.data.items):,} "
         f"described stretches, {len(pairs.texts):,} sentences, {pairs.data.minutes:.0f} minutes recorded"
     )
-    place = folder / f"{recipe.name}.safetensors"
 
-    def export(_: nn.Module, average: Average, step: int) -> None:
+    def export(average: Average, step: int) -> None:
         made = EvaluatorNet(config)
         made.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
         licences = "; ".join(pairs.data.licences)
         how = f"recipe {recipe.name}, {step} steps of {recipe.batch} pairs, seed {recipe.seed}"
         card = {"name": recipe.name, "licence": recipe.licence or licences, "data": licences, "made": how}
-        save_embedder(Embedder(made.eval(), mean, std, text, card), place)
+        save_embedder(Embedder(made.eval(), mean, std, text, card), run.place)
 
-    log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, on_save=export, on_step=log, stop=stop, say=say)
-    return place
+    return run.run(objective, export, about)
 
 
 def config_of(recipe: Recipe, text: TextEncoder) -> EvaluatorConfig:

@@ -5,7 +5,6 @@ y = 0, at 20 frames per second unless ``fps`` says otherwise. Angles are radians
 compares groups of duets with real ones.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -46,22 +45,15 @@ class HorizonError:
     """Distance of all 22 joints where they are in the world; mean over joints."""
 
 
-def completion_errors(
-    real: np.ndarray,
-    predicted: np.ndarray,
-    *,
-    prefix: int = PREFIX,
-    fps: float = FPS,
-    horizons: Sequence[float] = HORIZONS,
-) -> tuple[HorizonError, ...]:
+def completion_errors(real: np.ndarray, predicted: np.ndarray) -> tuple[HorizonError, ...]:
     """Prefix completion of two people (Shafir et al., priorMDM, 2023, table 3): one `HorizonError` per horizon.
 
     Both are (crops, 2, frames, 22, 3) or one crop without the first axis. Each is put in the frame of its own person 0
     at frame 0 (`in_first_frame`), as the published evaluation decodes it. Horizons are cumulative: seconds k averages
-    frames ``prefix`` to ``prefix + k fps``. Raises MotionloomError for other shapes or too few frames.
+    frames `PREFIX` to ``PREFIX + k FPS``. Raises MotionloomError for other shapes or too few frames.
     """
     r, p = (_crops(positions) for positions in (real, predicted))
-    need = prefix + round(max(horizons) * fps)
+    need = PREFIX + round(max(HORIZONS) * FPS)
     if r.shape != p.shape or r.shape[2] < need:
         raise MotionloomError(
             f"completions need as many crops of as many frames as the real ones, {need} or more; got {p.shape[:3]} "
@@ -72,7 +64,7 @@ def completion_errors(
     root = np.linalg.norm(apart[:, :, :, 0], axis=-1)
     joint = np.linalg.norm(apart[:, :, :, 1:] - apart[:, :, :, :1], axis=-1).mean(axis=-1)
     absolute = np.linalg.norm(apart, axis=-1).mean(axis=-1)
-    spans = [(k, slice(prefix, prefix + round(k * fps))) for k in horizons]
+    spans = [(k, slice(PREFIX, PREFIX + round(k * FPS))) for k in HORIZONS]
     return tuple(
         HorizonError(float(k), *(float(e[:, :, span].mean()) for e in (root, joint, absolute))) for k, span in spans
     )
@@ -108,9 +100,9 @@ def looking_away(positions: np.ndarray) -> Array:
     return np.stack([_between(way - ph.heading(p[0])), _between(way + np.pi - ph.heading(p[1]))])
 
 
-def mutual(positions: np.ndarray, *, within: float = LOOK) -> float:
-    """Share of frames in which each has the other within ``within`` radians of the heading."""
-    return float((looking_away(positions) < within).all(axis=0).mean())
+def mutual(positions: np.ndarray) -> float:
+    """Share of frames in which each has the other within `LOOK` radians of the heading."""
+    return float((looking_away(positions) < LOOK).all(axis=0).mean())
 
 
 # Touch ---------------------------------------------------------------------------------------------------------------
@@ -123,9 +115,9 @@ def hand_distance(positions: np.ndarray) -> Array:
     return np.linalg.norm(wrists[0][:, :, None] - wrists[1][:, None], axis=-1).min(axis=(1, 2))
 
 
-def hand_contact(positions: np.ndarray, *, within: float = HOLD) -> float:
-    """Share of frames in which a wrist of one is nearer than ``within`` metres to a wrist of the other."""
-    return float((hand_distance(positions) < within).mean())
+def hand_contact(positions: np.ndarray) -> float:
+    """Share of frames in which a wrist of one is nearer than `HOLD` metres to a wrist of the other."""
+    return float((hand_distance(positions) < HOLD).mean())
 
 
 def hand_to_body(positions: np.ndarray) -> Array:
@@ -139,9 +131,9 @@ def hand_to_body(positions: np.ndarray) -> Array:
     return np.minimum(*apart)
 
 
-def touch(positions: np.ndarray, *, within: float = TOUCH) -> float:
-    """Share of frames in which a wrist of one is nearer than ``within`` metres to the other's body, hands and all."""
-    return float((hand_to_body(positions) < within).mean())
+def touch(positions: np.ndarray) -> float:
+    """Share of frames in which a wrist of one is nearer than `TOUCH` metres to the other's body, hands and all."""
+    return float((hand_to_body(positions) < TOUCH).mean())
 
 
 def penetration_depth(positions: np.ndarray) -> Array:

@@ -4,8 +4,10 @@ A generated group is compared with real clips of the same kind: 20 frames per se
 y = 0. A number may be up to 1.5 times the real one, or smaller than anybody can see.
 """
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import resources
 
 import numpy as np
 
@@ -30,18 +32,11 @@ class Number:
     """Median over clips instead of the mean: a few clips on ladders must not speak for all."""
 
 
-NUMBERS: tuple[Number, ...] = (
-    Number("skate_ratio", "share of frames with a toe below 5 cm that slides faster than 0.5 m/s", 0.01),
-    Number("skate_speed", "cm/s of the toes below 5 cm, mean", 1.0),
-    Number("skate_weighted", "cm/s of the toes weighted by 2 - 2^(h / 2.5 cm), mean", 0.5),
-    Number("penetration", "cm the lowest joint is under the floor, mean", 0.3),
-    Number("float", "cm the lowest joint is over the floor, mean over frames, median over clips", 0.5, typical=True),
-    Number("jerk", "m/s^3 of all joints, mean", 5.0, both_ways=True),
-    Number("jerk_peak", "m/s^3 of any joint, largest in the clip", 50.0),
-    Number("bone_error", "mm the bones differ from their median in the clip, mean", 1.0),
-    Number("speed_median", "m/s of the pelvis across the floor, median over frames", 0.05, both_ways=True),
-    Number("speed_fast", "m/s of the pelvis, 90th percentile over frames", 0.05, both_ways=True),
-    Number("limb_speed", "m/s of wrists and ankles against the body, mean", 0.05, both_ways=True),
+NUMBERS: tuple[Number, ...] = tuple(
+    Number(name, **row)
+    for name, row in tomllib.loads(
+        (resources.files("motionloom_lab.suites") / "realism.toml").read_text(encoding="utf-8")
+    ).items()
 )
 
 

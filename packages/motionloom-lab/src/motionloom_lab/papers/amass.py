@@ -20,6 +20,7 @@ from motionloom.io import npz, text
 from motionloom.io.atomic import finished
 from motionloom.io.text import plain_json
 from motionloom_lab.papers import babel
+from motionloom_lab.papers.benchmark_layouts import TABLES
 from motionloom_train.data.prediction import Protocol, Recording, checked
 
 AMASS_LAYOUT = replace(SMPL_LAYOUT, across=(), root=False, z_up=True)
@@ -27,45 +28,11 @@ AMASS_LAYOUT = replace(SMPL_LAYOUT, across=(), root=False, z_up=True)
 AMASS_FPS, OBSERVED, FUTURE = 60.0, 30, 120
 AMASS_LICENCE = "AMASS: non-commercial research, under its own licence and those of its subsets"
 UNIFORM = "joint places are those of the uniform person's bones, not of the body model"
-AMASS_SETS = {
-    "train": (
-        "ACCAD",
-        "BMLhandball",
-        "BMLmovi",
-        "BMLrub",
-        "CMU",
-        "EKUT",
-        "EyesJapanDataset",
-        "KIT",
-        "PosePrior",
-        "TCDHands",
-        "TotalCapture",
-    ),
-    "val": ("HumanEva", "HDM05", "SFU", "MoSh"),
-    "test": ("DFaust", "DanceDB", "GRAB", "HUMAN4D", "SOMA", "SSM", "Transitions"),
-}
+AMASS_SETS: dict[str, list[str]] = TABLES["amass"]["sets"]
 """Whole data sets by split."""
-AMASS_SPEEDS = {
-    "DFaust": 0.0048603,
-    "DanceDB": 0.0081590,
-    "GRAB": 0.0017740,
-    "HUMAN4D": 0.0043917,
-    "SOMA": 0.0075961,
-    "SSM": 0.0057579,
-    "Transitions": 0.0085301,
-}
+AMASS_SPEEDS: dict[str, float] = TABLES["amass"]["speeds"]
 """Mean displacement of a joint by data set, metres per frame at 60 fps: what CMD compares with (BeLFusion)."""
-_OLD_NAMES = {
-    "biomotionlabntroje": "BMLrub",
-    "mpilimits": "PosePrior",
-    "tcdhandmocap": "TCDHands",
-    "mpihdm05": "HDM05",
-    "mpimosh": "MoSh",
-    "dfaust67": "DFaust",
-    "ssmsynced": "SSM",
-    "transitionsmocap": "Transitions",
-}
-_SETS = {name.lower(): name for names in AMASS_SETS.values() for name in names} | _OLD_NAMES
+_SETS = {name.lower(): name for names in AMASS_SETS.values() for name in names} | TABLES["amass"]["old_names"]
 _SPLITS = {name: split for split, names in AMASS_SETS.items() for name in names}
 _FARTHEST = 1e3
 _MAX_LIST = 16 << 20

@@ -18,7 +18,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io import text
 from motionloom.io.atomic import finished
 from motionloom_lab.papers.amass import is_amass, read_amass
-from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
+from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT, TABLES
 from motionloom_lab.papers.pickled import Tables, read_tables
 from motionloom_lab.papers.readers import find_takes
 from motionloom_train.data.prediction import Protocol, Recording, checked, read_cmu, read_folder
@@ -30,23 +30,7 @@ HUMANEVA_LICENCE = "HumanEva-I: research use only, under the licence of its owne
 H36M_TRAIN, H36M_TEST = ("S1", "S5", "S6", "S7", "S8"), ("S9", "S11")
 H36M_JOINTS = (0, 1, 2, 3, 6, 7, 8, 12, 13, 14, 15, 17, 18, 19, 25, 26, 27)
 """The 17 of the file's 32 joints that are kept."""
-H36M_SPEEDS = {
-    "Directions": 0.0045333,
-    "Discussion": 0.0050718,
-    "Eating": 0.0039681,
-    "Greeting": 0.0059260,
-    "Phoning": 0.0035907,
-    "Posing": 0.0041949,
-    "Purchases": 0.0056251,
-    "Sitting": 0.0024797,
-    "SittingDown": 0.0035406,
-    "Smoking": 0.0036022,
-    "Photo": 0.0043476,
-    "Waiting": 0.0042226,
-    "Walking": 0.0075376,
-    "WalkDog": 0.0070660,
-    "WalkTogether": 0.0067542,
-}
+H36M_SPEEDS: dict[str, float] = TABLES["h36m"]["speeds"]
 """Mean displacement of a joint by action, metres per frame at 50 fps: what CMD compares with (BeLFusion)."""
 _ALIASES = {"TakingPhoto": "Photo", "WalkingDog": "WalkDog", "WalkingTogether": "WalkTogether"}
 HUMANEVA_DROPPED = {

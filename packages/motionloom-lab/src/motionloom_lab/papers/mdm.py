@@ -34,12 +34,6 @@ _LAYER = {
     "self_attn.out_proj.bias": "attention.out.bias",
 }
 _STACK = "seqTransEncoder.layers."
-_NEEDED = (
-    "input_process.poseEmbedding.weight",
-    "output_process.poseFinal.weight",
-    "embed_text.weight",
-    f"{_STACK}0.linear1.weight",
-)
 
 
 @dataclass(frozen=True)

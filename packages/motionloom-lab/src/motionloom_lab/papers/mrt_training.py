@@ -4,10 +4,8 @@ Loss: mean squared error of the displacements from frame to frame of each of thr
 before it. Pairs are cropped, mirrored half of the time and turned any way.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -16,10 +14,9 @@ from torch import Tensor, nn
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
 from motionloom.kinematics.physics import turned
-from motionloom.weights.prior import find_device
 from motionloom_lab.papers.mrt import Mrt, MrtConfig, MrtFile
 from motionloom_train.data.pairs import Pair, mirrored
-from motionloom_train.loop import Average, Log, World, train
+from motionloom_train.loop import Average, Training
 from motionloom_train.recipe import Recipe
 
 SECONDS = 3
@@ -72,58 +69,24 @@ class Seconds:
         return 1000 * ((said - wanted) ** 2).mean()
 
 
-class MrtSettings(TypedDict, total=False):
-    """What of the recipe may be asked otherwise."""
+def train_mrt(run: Training, pairs: Sequence[Pair], config: MrtConfig | None = None) -> Path:
+    """Train (or go on training) on the ``train`` pairs at 20 frames per second; returns the file of the weights.
 
-    steps: int
-    batch: int
-    seed: int
-
-
-def train_mrt(
-    pairs: Sequence[Pair],
-    folder: Path | str,
-    *,
-    config: MrtConfig | None = None,
-    device: str | None = None,
-    stop: int | None = None,
-    say: Callable[[str], None] = print,
-    **settings: Unpack[MrtSettings],
-) -> Path:
-    """Train (or go on training) on the ``train`` pairs at 20 frames per second.
-
-    Args:
-        pairs: people who do something together.
-        folder: for the weights and the state of training.
-        config: sizes; None: the usual ones.
-        device: cpu, cuda, or None for what there is.
-        stop: make a break after so many steps.
-        say: called with a line of progress now and then.
-        settings: see `Settings`.
-
-    Returns:
-        ``folder/mrt.safetensors``.
+    run: with `RECIPE`, or another number of steps, of rows or of the seed. config: sizes; None: the usual ones.
     """
-    steps, batch = settings.get("steps", RECIPE.steps), settings.get("batch", RECIPE.batch)
-    seed = settings.get("seed", 0)
-    if device:
-        find_device(device)
-    recipe = replace(RECIPE, steps=steps, batch=batch, seed=seed)
+    recipe = run.recipe
     chosen = [pair for pair in pairs if pair.split == "train"]
-    torch.manual_seed(seed)
-    world, net = World.join(device), Mrt(config or MrtConfig())
-    objective = Seconds(net, chosen, device=world.device)
-    place = Path(folder) / "mrt.safetensors"
-    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(chosen)} pairs and their mirror images")
+    torch.manual_seed(recipe.seed)
+    net = Mrt(config or MrtConfig())
+    objective = Seconds(net, chosen, device=run.world.device)
 
-    def export(_: nn.Module, average: Average, step: int) -> None:
+    def export(average: Average, step: int) -> None:
         made = Mrt(net.config)
         made.load_state_dict(average.weights)
-        notes = {"steps": step, "batch": batch, "seed": seed, "recordings": len(chosen)}
+        notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "recordings": len(chosen)}
         licences = "; ".join(sorted({pair.licence for pair in chosen}))
         sources = ", ".join(sorted({pair.source for pair in chosen}))
-        MrtFile(made, licences, f"{len(chosen)} train pairs of {sources}", notes).save(place)
+        MrtFile(made, licences, f"{len(chosen)} train pairs of {sources}", notes).save(run.place)
 
-    log = Log(Path(folder), recipe, say=say)
-    train(objective, recipe, folder, world=world, on_save=export, on_step=log, stop=stop, say=say)
-    return place
+    about = f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(chosen)} pairs and their mirror images"
+    return run.run(objective, export, about)

@@ -113,15 +113,15 @@ def read_sequence(path: Path | str) -> Array:
     return positions if camera is None else without_drift(positions, rot.rotate(turn, camera))
 
 
-def without_drift(positions: np.ndarray, camera: np.ndarray, *, fps: float = RATE) -> Array:
+def without_drift(positions: np.ndarray, camera: np.ndarray) -> Array:
     """(people, frames, 22, 3) less what planted feet share with the camera's path (frames, 3), all metres, +Y up."""
     ground = np.array([1.0, 0.0, 1.0])
-    path = smooth(camera * ground, 2 * round(fps / 2) + 1)
-    camera_speed = velocity(path, fps)
+    path = smooth(camera * ground, 2 * round(RATE / 2) + 1)
+    camera_speed = velocity(path, RATE)
     together = square = 0.0
     for person in positions:
         toes = person[:, TOES]
-        speed = velocity(toes, fps) * ground
+        speed = velocity(toes, RATE) * ground
         low = toes[..., 1] < np.percentile(toes[..., 1].min(axis=1), 5) + _PLANTED_HEIGHT
         planted = low & (np.linalg.norm(speed, axis=-1) < _PLANTED_SPEED)
         together += float((speed * camera_speed[:, None]).sum(-1)[planted].sum())

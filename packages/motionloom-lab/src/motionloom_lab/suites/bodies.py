@@ -28,22 +28,20 @@ def known() -> bodies.Reach:
     return {name: tuple(values) for name, values in json.loads(place.read_text(encoding="utf-8"))["reach"].items()}
 
 
-def reach_of(
-    folders: Sequence[Path | str], *, most: int = MOST, say: Callable[[str], None] = lambda line: None
-) -> bodies.Reach:
+def reach_of(folders: Sequence[Path | str], *, say: Callable[[str], None] = lambda line: None) -> bodies.Reach:
     """Percentiles of the people recorded in folders, on their own skeletons; what is animated by hand is left out.
 
-    most: recordings of each folder that are read, spread evenly over it.
+    Of each folder `MOST` recordings are read, spread evenly over it.
     Raises `MotionloomError` for folders without recordings of joints.
     """
-    return bodies.reach_of(_recordings(folders, most, say))
+    return bodies.reach_of(_recordings(folders, say))
 
 
-def _recordings(folders: Sequence[Path | str], most: int, say: Callable[[str], None]) -> Iterator[Array]:
+def _recordings(folders: Sequence[Path | str], say: Callable[[str], None]) -> Iterator[Array]:
     count = 0
     for folder in folders:
         captured = [take for take in find_takes(folder) if take.kind == "capture"]
-        takes = [captured[k * len(captured) // most] for k in range(most)] if len(captured) > most else captured
+        takes = [captured[k * len(captured) // MOST] for k in range(MOST)] if len(captured) > MOST else captured
         for number, take in enumerate(takes):
             if number % 100 == 0:
                 say(f"{folder}: recording {number + 1} of {len(takes)}")

@@ -22,8 +22,7 @@ PROMPT = "a person walks forward and waves"
 
 def tools_of(asked: Asked) -> registry.Tools:
     """Motions and speeds of the weights, which are loaded once, when a suite first asks."""
-    from motionloom.tasks.text import generate
-    from motionloom_lab.bench import bench, defaults
+    from motionloom_lab.bench import Sampling, bench
     from motionloom_lab.suites.generator import generator
 
     @cache
@@ -34,9 +33,7 @@ def tools_of(asked: Asked) -> registry.Tools:
         generator=lambda finished: generator(prior(), finished=finished),
         prior=prior,
         memory=lambda steps: memory_of(asked, steps),
-        speed=lambda quick: bench(
-            prior(), defaults(generate), what="all", quick=quick, weights=asked["weights"], progress=say
-        ),
+        speed=lambda quick: bench(prior(), Sampling(), what="all", quick=quick, weights=asked["weights"], progress=say),
         progress=say,
     )
 

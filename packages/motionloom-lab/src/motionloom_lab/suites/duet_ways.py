@@ -6,7 +6,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import torch
@@ -47,7 +46,6 @@ class Crops:
 Way = Callable[[Crops, int], Array]
 Features = Callable[..., tuple[np.ndarray, np.ndarray]]
 """`tasks.pair.pair_features`, or what takes its place."""
-Given = Literal["past", "tool", "published"]
 FRAMES = 80
 """Frames of a completion, the given ones included."""
 GIVEN: dict[str, tuple[int, bool]] = {"past": (PREFIX, False), "tool": (PREFIX, True), "published": (PREFIX - 1, True)}

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -29,7 +29,6 @@ CHUNK = 64
 DIVERSITY_PAIRS = 300
 PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", "bone_error")
 """Names of the numbers of `physical`, in order."""
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Generate(Protocol):

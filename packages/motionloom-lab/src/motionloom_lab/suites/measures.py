@@ -113,13 +113,15 @@ def _mrt(job: "Job", asked: Asked) -> Path | None:
     if own is None or steps < 1:
         raise MotionloomError("--train-mrt needs one step or more, and --out FOLDER for its weights")
     if not own.is_file():
-        from motionloom_lab.papers.mrt_training import train_mrt
+        from motionloom_lab.papers.mrt_training import RECIPE, train_mrt
         from motionloom_lab.papers.readers import find_pairs
+        from motionloom_train.loop import Training
 
         assert job.data is not None  # --data is required
         say = job.tools.progress
         pairs = find_pairs(job.data, captions=False, say=say)
-        train_mrt(pairs, own.parent, steps=steps, seed=asked.get("seed", 0), device=job.device, say=say)
+        recipe = replace(RECIPE, steps=steps, seed=asked.get("seed", 0))
+        train_mrt(Training(recipe, own.parent, job.device, say=say), pairs)
     return own
 
 

@@ -1,10 +1,11 @@
 """What a predictor does over long times, with parts held, and on the way to a target: studies of given weights.
 
-Every function takes a predictor, a protocol with a test part and a budget, and gives columns, rows and what to say of
-the settings; `prediction_studies` writes them.
+Every function takes a `Study`, whose protocol has a test part, and gives columns, rows and what to say of the settings;
+`prediction_studies` writes them.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,18 +33,33 @@ from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, from_
 from motionloom_train.data.prediction import Protocol
 
 Found = tuple[tuple[Column, ...], list[Row], dict[str, Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What is studied, and how much of it."""
+
+    predictor: Predictor
+    protocol: Protocol
+    windows: int
+    samples: int
+    seed: int = 0
+    seconds: float = 20.0
+    """Of a long horizon."""
+    say: Say = silent
+
+
 POSES = 3000
 """Training poses that others are compared with."""
 GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body", "upper_body")
 TRANSITIONS = (0.5, 1.0, 2.0)
 
 
-def horizon(
-    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
-) -> Found:
+def horizon(asked: Study) -> Found:
     """Futures that go on from themselves, second by second: do they freeze, do they drift."""
-    trial = trials.prepare(protocol, count=windows)
-    made = long_futures(predictor, trial, samples=samples, seed=seed, seconds=seconds, say=say)
+    predictor, protocol, seconds = asked.predictor, asked.protocol, asked.seconds
+    trial = trials.prepare(protocol, count=asked.windows)
+    made = long_futures(predictor, trial, samples=asked.samples, seed=asked.seed, seconds=seconds, say=asked.say)
     known = _known_poses(protocol)
     real = np.stack([trial.future(k) for k in range(len(trial.windows))])
     rows = [plain_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
@@ -51,7 +67,7 @@ def horizon(
     for start in range(0, made.shape[2] - second + 1, second):
         part = made[:, :, start : start + second]
         numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
-        spread = {"spread": _spread(part, protocol.layout)} if samples > 1 else {}
+        spread = {"spread": _spread(part, protocol.layout)} if asked.samples > 1 else {}
         rows.append(plain_row(f"second {start // second + 1}", numbers | spread))
     return (
         columns("study-horizon"),
@@ -121,17 +137,16 @@ def _spread(motions: Array, layout: Layout) -> float:
     return float(np.mean(apart) / np.sqrt(poses.shape[-1] / 3)) if apart else 0.0
 
 
-def hold(
-    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
-) -> Found:
+def hold(asked: Study) -> Found:
     """Each group of joints given in all of the future: how much nearer the others come, how they vary."""
-    _need_person(predictor)
-    trial = trials.prepare(protocol, count=windows)
+    _need_person(asked.predictor)
+    trial = trials.prepare(asked.protocol, count=asked.windows)
     rows = []
     for group in GROUPS:
-        say(f"hold {group}: {len(trial.windows)} windows")
-        rows.append(plain_row(group, held_numbers(predictor, trial, group, samples=samples, seed=seed)))
-    return columns("study-hold"), rows, {"weights": predictor.card.name, "given": "as in the real future"}
+        asked.say(f"hold {group}: {len(trial.windows)} windows")
+        numbers = held_numbers(asked.predictor, trial, group, samples=asked.samples, seed=asked.seed)
+        rows.append(plain_row(group, numbers))
+    return columns("study-hold"), rows, {"weights": asked.predictor.card.name, "given": "as in the real future"}
 
 
 def held_numbers(
@@ -182,12 +197,11 @@ def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, gr
     return float(np.minimum(np.abs(got - wanted).max(-1), np.abs(got + wanted).max(-1)).max())
 
 
-def arrive(
-    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
-) -> Found:
+def arrive(asked: Study) -> Found:
     """The way from one recording to another, for transitions of several lengths."""
+    predictor, protocol = asked.predictor, asked.protocol
     _need_person(predictor)
-    trial = trials.prepare(protocol, count=windows)
+    trial = trials.prepare(protocol, count=asked.windows)
     count = len(trial.windows)
     if count < 2:
         raise MotionloomError("a switch leads from one window to another; measure two or more")
@@ -205,14 +219,12 @@ def arrive(
         cut.append(_seam(np.concatenate([p, q]), seen, predictor.fps, "start"))
     rows.append(plain_row("cut", _mean(cut)))
     for length in TRANSITIONS:
-        say(f"switch in {length:g} s: {len(pairs)} pairs")
-        found = [
-            switched(
-                predictor, clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b])), seconds=length, seed=seed + i
-            )
-            for a, b in pairs
-            for i in range(samples)
-        ]
+        asked.say(f"switch in {length:g} s: {len(pairs)} pairs")
+        found = []
+        for a, b in pairs:
+            past, target = clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b]))
+            for i in range(asked.samples):
+                found.append(switched(predictor, past, target, seconds=length, seed=asked.seed + i))
         rows.append(plain_row(f"{length:g} s", _mean(found)))
     return columns("study-switch"), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
 
@@ -245,4 +257,4 @@ def _need_person(predictor: Predictor) -> None:
         raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
 
 
-STUDIES: dict[str, Callable[..., Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}
+STUDIES: dict[str, Callable[[Study], Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}

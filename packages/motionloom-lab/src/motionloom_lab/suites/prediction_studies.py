@@ -21,10 +21,11 @@ from motionloom_lab.report.report import REAL, Column, Report, Row, Value
 from motionloom_lab.suites import prediction, prediction_behaviour
 from motionloom_lab.suites import prediction_trial as trials
 from motionloom_lab.suites.harness import Run, Say, silent, weight_marks
+from motionloom_lab.suites.prediction_behaviour import Study
 from motionloom_lab.suites.prediction_trial import PredictionTrial
 from motionloom_lab.suites.protocol import check_ranges
 from motionloom_train.data.prediction import Protocol
-from motionloom_train.loop import changed
+from motionloom_train.loop import Training, changed
 from motionloom_train.predictor import train_predictor
 from motionloom_train.recipe import Recipe
 
@@ -137,15 +138,8 @@ def study(name: str, lab: Lab) -> Report:
     """The report of a study."""
     if name in prediction_behaviour.STUDIES:
         b = lab.budget
-        columns, rows, said = prediction_behaviour.STUDIES[name](
-            lab.weights(),
-            lab.protocol,
-            windows=b.windows,
-            samples=b.samples,
-            seed=b.seed,
-            seconds=b.seconds,
-            say=lab.progress,
-        )
+        asked = Study(lab.weights(), lab.protocol, b.windows, b.samples, b.seed, b.seconds, lab.progress)
+        columns, rows, said = prediction_behaviour.STUDIES[name](asked)
     elif name == "steps":
         columns, rows, said = _steps(lab)
     else:
@@ -210,11 +204,8 @@ def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, An
 
 def network(lab: Lab, setting: str, value: Any) -> Predictor:
     """The small network with one thing changed: trained, trained further, or as it lies in ``lab.keep``."""
-    net = (
-        BASE
-        | ({setting: value} if setting in BASE else {})
-        | ({} if (setting, value) != ("dct", False) else {"dct": False})
-    )
+    own = {setting: value} if setting in BASE or (setting, value) == ("dct", False) else {}
+    net: dict[str, Any] = BASE | own
     net["kept"] = min(net["kept"], lab.protocol.frames)
     other = {setting: value} if setting in ("schedule", "levels") else {}
     schedule, levels = other.get("schedule", "cosine"), other.get("levels", 1000)
@@ -239,9 +230,8 @@ def network(lab: Lab, setting: str, value: Any) -> Predictor:
         raise MotionloomError(f"{folder} holds a network of other settings; name another folder with --keep")
     place = folder / f"{name}.safetensors"
     if not place.is_file() or load_predictor(place).card.notes.get("steps") != steps:
-        train_predictor(
-            recipe, lab.protocol, folder, device=lab.device, say=lambda line: lab.progress(f"{name}: {line}")
-        )
+        said = lambda line: lab.progress(f"{name}: {line}")  # noqa: E731
+        train_predictor(Training(recipe, folder, lab.device, say=said), lab.protocol)
     return load_predictor(place).to(lab.device)
 
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from motionloom.cli.options import add_options
 from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import fail, request_of
 from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.errors import MotionloomError
 from motionloom.formats import readable
 from motionloom.requests.export import Source
 from motionloom.requests.teach import Teach
@@ -87,7 +89,6 @@ def _words(words: list[str]) -> tuple[str, list[str]]:
 
 def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "tuple[list[Motion], list[list[Any]]]":
     """The clips, and what is wrong with each."""
-    from motionloom.errors import MotionloomError
     from motionloom.io import load
     from motionloom.retarget.upright import stood_up
     from motionloom_train.data.clip_check import check_file
@@ -141,8 +142,6 @@ def _refuse(captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> None
 def _teach(
     arguments: argparse.Namespace, examples: "list[Example]", out: Path, captioned: "list[CaptionedClip]"
 ) -> None:
-    import time
-
     from motionloom.weights.prior import Prior
     from motionloom_train.teach import Lesson, teach
     from motionloom_train.threads import set_threads

@@ -1,7 +1,9 @@
 """Training batches: which windows of a set are drawn, and how often."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
@@ -17,96 +19,8 @@ from motionloom_train.data.sets import Item, MotionSet
 SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
 """How often a training sample shows a named action, a written caption, an index description, a measured label."""
 
-FAVOUR: dict[str, float] = {
-    **dict.fromkeys(("climb", "descend", "kick", "walk slow", "punch"), 2.5),
-    **dict.fromkeys(("climb stairs", "circle left"), 5.0),
-    "walk fast": 3.5,
-    **dict.fromkeys(("hop", "turn around", "turn around right"), 3.0),
-    "jump": 2.5,
-    "walk backward": 2.0,
-    **dict.fromkeys(("kick left", "kick right"), 4.0),
-    **dict.fromkeys(("punch left", "punch right", "turn left", "turn right", "walk left turn", "walk right turn"), 2.5),
-    **dict.fromkeys(("sit down", "stand up", "jog"), 1.5),
-    # recorded waves: one man who directs traffic with one arm and then the other; made ones show a wave
-    "wave": 0.3,
-    # windows of many squats (made ones show one and two), and a body that lies knotted
-    **dict.fromkeys(("squat once", "squat twice", "action:lie with crossed legs"), 0.02),
-    **{
-        f"action:{name}": weight
-        for weight, names in {
-            8.0: (
-                "made behind a walk",
-                "made punch",
-                "made fists up",
-                "made carry",
-                "made hands on hips",
-                "made open door",
-                "made swing arms",
-                "lie down",
-            ),
-            7.0: ("get up", "walk turn around", "kick"),
-            5.0: (
-                "sit down",
-                "stand up",
-                "push-up",
-                "lunge",
-                "duck",
-                "sway",
-                "crouch",
-                "touch toes",
-                "punch",
-                "balance with arms out",
-                "hop",
-                "made drink",
-                "throw",
-                "high step",
-                "slow down",
-                "stop running",
-                "bow",
-                "pick up",
-                "cartwheel",
-                "run and jump",
-            ),
-            4.0: (
-                "kneel",
-                "sit down and stand up",
-                "stop walking",
-                "crawl",
-                "then",
-                "squat",
-                "made arm up twice",
-            ),
-            2.5: (
-                "climb ladder",
-                "start running",
-                "walk and pick up",
-                "made clap",
-                "made arms out",
-                "made arms up twice",
-                "raise arm",
-                "made arm up",
-                "kneel and rise",
-                "bend over",
-                "stairs",
-                "fall",
-                "leg raise",
-                "side lunge",
-                "dance",
-                "jump forward",
-                "jump up",
-                "start walking",
-                "made point",
-                "made wave",
-                "lie",
-                "one squat",
-                "two squats",
-                "three squats",
-            ),
-            0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry", "drink"),
-        }.items()
-        for name in names
-    },
-}
+_ROWS = tomllib.loads((resources.files("motionloom_train.data") / "favour.toml").read_text(encoding="utf-8"))
+FAVOUR: dict[str, float] = _ROWS["labels"] | {f"action:{name}": often for name, often in _ROWS["actions"].items()}
 """Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
 labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
 MADE_SHARE = 0.6

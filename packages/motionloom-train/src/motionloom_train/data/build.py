@@ -29,7 +29,6 @@ from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
 from motionloom.io.atomic import atomic_path, finished, sweep
 from motionloom.kinematics.physics import Array
-from motionloom.skeleton import SMPL22
 from motionloom_train.data import augment, gate
 from motionloom_train.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to
 from motionloom_train.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write_clip
@@ -57,7 +56,6 @@ _DERIVED = re.compile(r"M?(held|mixed|joined|made|posture|there)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
 BENDS = (0.35, 0.75, 1.0)
 """Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
-_MIRROR = list(SMPL22.mirror_pairs())
 LONG = 60
 """Frames from which on the part of a described change that matters is looked for."""
 

@@ -147,9 +147,9 @@ def _ease(x: Array) -> Array:
     return x**3 * (10 - 15 * x + 6 * x**2)
 
 
-def words_for(gesture: Gesture, side: str, lead: str, rng: np.random.Generator, *, count: int = 8) -> tuple[str, ...]:
-    """Sentences for a gesture; ``lead``: what the body does meanwhile, such as ``walks``, or empty."""
+def words_for(gesture: Gesture, side: str, lead: str, rng: np.random.Generator) -> tuple[str, ...]:
+    """Up to 8 sentences for a gesture; ``lead``: what the body does meanwhile, such as ``walks``, or empty."""
     phrases = [*gesture.says, *(phrase.format(side=side) for phrase in gesture.sided)]
     if lead:
         phrases = [f"{lead} and {phrase}" for phrase in phrases]
-    return tuple(dict.fromkeys(sentence(phrases[i % len(phrases)], rng) for i in range(count)))
+    return tuple(dict.fromkeys(sentence(phrases[i % len(phrases)], rng) for i in range(8)))

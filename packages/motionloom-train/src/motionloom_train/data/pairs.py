@@ -244,26 +244,8 @@ def windows(pair: Pair, frames: int, stride: int) -> Iterator[Pair]:
     return (crop(pair, start, frames) for start in range(0, pair.frames - frames + 1, stride))
 
 
-def random_crop(pair: Pair, rng: np.random.Generator, *, shortest: int, longest: int, unit: int = 4) -> Pair | None:
-    """A crop of random length and place; None where the pair is shorter than ``shortest``.
-
-    Lengths are multiples of ``unit`` from ``shortest`` to ``longest`` or the pair's own (ComMDM: 80 and 80 for
-    completion, 80 and 196 for text). A crop as long as the pair is the pair.
-    """
-    longest = min(longest, pair.frames)
-    if longest < shortest:
-        return None
-    frames = shortest + unit * int(rng.integers((longest - shortest) // unit + 1))
-    return crop(pair, int(rng.integers(pair.frames - frames + 1)), frames)
-
-
 def mirrored(pair: Pair) -> Pair:
     """Left and right exchanged, in the captions too; its name begins with M."""
     positions = pair.positions[:, :, _MIRROR] * np.array([-1.0, 1.0, 1.0])
     captions = tuple(mirror_text(text) for text in pair.captions)
     return replace(pair, name="M" + pair.name, captions=captions, positions=positions)
-
-
-def swapped(pair: Pair) -> Pair:
-    """The second person first. Captions speak of both and stay."""
-    return replace(pair, positions=pair.positions[::-1])

@@ -17,8 +17,6 @@ from motionloom.features.humanml import resample_positions
 from motionloom.features.positions import SMPL_LAYOUT, Layout
 from motionloom_train.data.sources import Take, find_takes
 
-Array = NDArray[np.float64]
-
 CMU_TEST = ("02", "05", "09", "13", "39")
 """Subjects of the CMU part that no training sees: everyday actions, dances, swordplay, runs, walks."""
 CMU_VAL = ("03", "07", "12")

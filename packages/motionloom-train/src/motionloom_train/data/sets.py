@@ -105,7 +105,7 @@ def statistics(clips: Sequence[Clip]) -> tuple[np.ndarray, np.ndarray]:
     return mean.astype(np.float32), std.astype(np.float32)
 
 
-def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, cache: Path | None = None) -> MotionSet:
+def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) -> MotionSet:
     """Read the training split of a built set. ``seed`` fixes the wordings of measured labels."""
     clips = read_clips(folder, sources=sources)
     mean, std = statistics(clips)

@@ -9,8 +9,10 @@ clip's own text names the action. They describe training windows only and share 
 import functools
 import operator
 import re
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -166,106 +168,22 @@ def _comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], 
     return tuple((name, _OPERATORS[sign], float(number)) for name, sign, number in parts)
 
 
-_KICK, _KICKED = r"kick|geri|karate|martial", "kick_height > 0.5, foot_speed > 4.4"
-_PUNCH = r"punch|strike|boxing|oiduki"
-_JUMP, _JUMPED = r"jump|hop|leap|exercise", "jump_rise > 0.2, jump_clearance > 0.16"
-_ACROBAT = r"danc|ballet|handstand|capoeira|flip"
-_STEPS, _CLIMBED = r"stair|\bup .{0,12}steps|steps up", r"playground|hang|\bbox"
-_STAIRS, _SEAT, _UPRIGHT = r"climb|stair|steps|ladder", r"\bsit|seat|chair|stool", ("squat", "crouch", "bend")
+def _rules(rows: Sequence[Mapping[str, Any]]) -> tuple[Rule, ...]:
+    """Rules of ``windows.toml``, with what their names stand for."""
+    named = _ROWS["words"] | _ROWS["measures"]
 
-ALONE = (
-    Rule("cartwheel", "bend > 70", (r"cartwheel",)),
-    Rule("jumping jacks", "both_over_head > 0.1, flights >= 2", (r"\bjack",)),
-)
-"""The first of these is a window's only label."""
+    def whole(value: Any) -> Any:
+        if isinstance(value, list):
+            return tuple(map(whole, value))
+        return re.sub(r"\$(\w+)", lambda match: named[match[1]], value)
 
-GESTURES = (
-    Rule("punch,punch left", "left_punch > 1.4, left_forward > 1.1, right_punch < 0.9", (_PUNCH,), choice="punch"),
-    Rule("punch,punch right", "right_punch > 1.4, right_forward > 1.1, left_punch < 0.9", (_PUNCH,), choice="punch"),
-    Rule("punch", "punch_speed > 1.4", (_PUNCH,), choice="punch"),
-    Rule("kick ball", _KICKED, (_KICK, r"soccer|\bball\b"), choice="kick"),
-    Rule("kick,kick left", f"{_KICKED}, left_kick > 0.5, right_kick < 0.25", (_KICK,), _ACROBAT, choice="kick"),
-    Rule("kick,kick right", f"{_KICKED}, right_kick > 0.5, left_kick < 0.25", (_KICK,), _ACROBAT, choice="kick"),
-    Rule("kick", _KICKED, (_KICK,), _ACROBAT, choice="kick"),
-    Rule("kick ball", "kick_height > 0.3, foot_speed > 5.0", (r"soccer",), choice="kick"),
-    Rule("hop", "hops >= 3, flights >= 3", (_JUMP, r"hop|one foot|one leg"), choice="jump"),
-    Rule("jump repeatedly", f"{_JUMPED}, flights >= 3, off_place < 0", (_JUMP,), choice="jump"),
-    Rule("jump forward", f"{_JUMPED}, advance > 0.8", (_JUMP,), choice="jump"),
-    Rule("jump", _JUMPED, (_JUMP,), choice="jump"),
-    Rule(
-        "wave",
-        "wave_swings >= 4, hand_over_neck > -0.1, both_raised < 0.3, travel < 2",
-        (r"wav|traffic|bye",),
-        r"danc|karate|sword|object",
-    ),
-    Rule("climb", "rise > 0.35, advance < 0.5", (_STAIRS,), choice="climb"),
-    Rule("climb stairs", "rise > 0.35", (_STEPS,), _CLIMBED, choice="climb"),
-    Rule("climb", "rise > 0.35", (_STAIRS,), choice="climb"),
-    Rule("climb down", "rise < -0.35, advance < 0.5", (_STAIRS,), choice="climb"),
-    Rule("descend", "rise < -0.35", (_STEPS,), _CLIMBED, choice="climb"),
-    Rule("climb down", "rise < -0.35", (_STAIRS,), choice="climb"),
-    Rule("dance", "mean_stir > 0.45", (r"danc|salsa|ballet|pirouette",)),
-    Rule("balance", "one_leg > 1.5, travel < 1.0", (r"balance|one leg",)),
-    # changes are seen whole: upright before sitting down, crouching and bending, upright behind standing up
-    Rule("sit", "low_share > 0.9, bend < 75", (_SEAT,), choice="sit", closes=_UPRIGHT),
-    Rule(
-        "sit down", "height_first > 0.88, height_last < 0.78, tilt_last < 45", (_SEAT,), choice="sit", closes=_UPRIGHT
-    ),
-    Rule(
-        "stand up", "height_first < 0.78, height_last > 0.88, tilt_first < 45", (_SEAT,), choice="sit", closes=_UPRIGHT
-    ),
-    Rule("squat once", "dips >= 1, dips < 2", (r"squat",), choice="squat"),
-    Rule("squat twice", "dips >= 2, dips < 3", (r"squat",), choice="squat"),
-    Rule("squat three times", "dips >= 3, dips <= 3", (r"squat",), choice="squat"),
-    Rule(
-        "crouch",
-        "pelvis_low < 0.72, knees > 80, height_first > 0.85",
-        without=r"climb|danc|snake|fish|whale|ladder|crawl|sit",
-        choice="crouch",
-    ),
-    Rule(
-        "bend",
-        "bend > 60, pelvis_low > 0.6, tilt_first < 35, tilt_last < 35",
-        without=r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll",
-        choice="bend",
-    ),
-    Rule("arms up", "hands_up > 0.6, both_over_head > 0.05", without=r"climb|ladder|danc|hang"),
-)
-"""Every choice among these may give labels to one window."""
+    return tuple(Rule(**{"measures": "", **{key: whole(value) for key, value in row.items()}}) for row in rows)
 
-_ON_THE_SPOT = "speed < 0.25, travel < 0.8, pelvis_low > 0.85"
-_CIRCLE = "winding > 250, gap < 0.5, facing_share > 0.6"
-_STRAIGHT = "turned < 40, winding < 70"
-_SIDEWAYS = "side_share > 0.7, turned < 60"
-_CURVE = "facing_share > 0.5, pace < 1.9"
 
-PATHS = (
-    Rule("stand", "stir < 0.28, travel < 0.15, turned < 25, pelvis_low > 0.9, hand_over_neck < -0.2"),
-    Rule("", "", (r"danc|salsa|climb|playground|acrobat|karate|cartwheel",)),
-    Rule("turn left,turn around", f"{_ON_THE_SPOT}, turn > 135, turn < 225"),
-    Rule("turn left", f"{_ON_THE_SPOT}, turn > 60"),
-    Rule("turn right,turn around right", f"{_ON_THE_SPOT}, turn < -135, turn > -225"),
-    Rule("turn right", f"{_ON_THE_SPOT}, turn < -60"),
-    Rule("", "speed < 0.25"),
-    Rule("", "pelvis_low < 0.8"),
-    Rule("run circle", f"{_CIRCLE}, pace > 2"),
-    Rule("circle left", f"{_CIRCLE}, turn > 0"),
-    Rule("circle right", _CIRCLE),
-    Rule("run", f"{_STRAIGHT}, facing_share > 0.75, pace > 2.7"),
-    Rule("jog", f"{_STRAIGHT}, facing_share > 0.75, pace > 2.0"),
-    Rule("walk,walk slow", f"{_STRAIGHT}, facing_share > 0.75, pace < 0.85"),
-    Rule("walk,walk fast", f"{_STRAIGHT}, facing_share > 0.75, pace > 1.5"),
-    Rule("walk", f"{_STRAIGHT}, facing_share > 0.75"),
-    Rule("walk backward", f"{_STRAIGHT}, facing_share < -0.75, pace < 1.7"),
-    Rule("jog backward", f"{_STRAIGHT}, facing_share < -0.75"),
-    Rule("sidestep left", f"{_SIDEWAYS}, left > 0"),
-    Rule("sidestep right", _SIDEWAYS),
-    Rule("walk left turn", f"{_CURVE}, turn > 55, turn < 135"),
-    Rule("walk right turn", f"{_CURVE}, turn < -55, turn > -135"),
-    Rule("walk turn back", "turn > 140, turn < 220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
-    Rule("walk turn back right", "turn < -140, turn > -220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
-)
-"""The first of these names where a window without a gesture goes."""
+_ROWS = tomllib.loads((resources.files("motionloom_train.data") / "windows.toml").read_text(encoding="utf-8"))
+ALONE, GESTURES, PATHS = (_rules(_ROWS[name]) for name in ("alone", "gestures", "paths"))
+"""The first of the first is a window's only label; every choice of the second may give labels to one window; the first
+of the last names where a window without a gesture goes."""
 
 
 def label_window(positions: Array, fps: float, text: str) -> list[str]:
@@ -300,15 +218,17 @@ def _every(rules: Sequence[Rule], compared: Measures, words: str) -> list[str]:
     return found
 
 
-def label_clip(
-    positions: Array, fps: float, text: str, *, lengths: tuple[float, ...] = (2.5, 4.0, 6.0)
-) -> list[tuple[int, int, str]]:
+LENGTHS = (2.5, 4.0, 6.0)
+"""Seconds of the windows that are labelled."""
+
+
+def label_clip(positions: Array, fps: float, text: str) -> list[tuple[int, int, str]]:
     """(first frame, end frame, label) of every labelled window of a clip; the whole clip where it is shorter."""
     spans: list[tuple[int, int, str]] = []
-    for seconds in lengths:
+    for seconds in LENGTHS:
         size = round(seconds * fps)
         if len(positions) < size:
-            if seconds == lengths[0] and len(positions) >= fps:
+            if seconds == LENGTHS[0] and len(positions) >= fps:
                 spans += [(0, len(positions), name) for name in label_window(positions, fps, text)]
             break
         for start in range(0, len(positions) - size + 1, round(fps / 2)):

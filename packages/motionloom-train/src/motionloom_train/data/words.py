@@ -43,30 +43,7 @@ def mirror_text(text: str) -> str:
 _WORDS = tomllib.loads((resources.files("motionloom_train.data") / "phrases.toml").read_text(encoding="utf-8"))
 LABELS: dict[str, tuple[str, ...]] = {label: tuple(said) for label, said in _WORDS["labels"].items()}
 """Verb phrases for what a window measurably shows; see `data.windows`."""
-_PEOPLE = (
-    *["a person"] * 12,
-    *["someone", "a man", "a woman", "he", "she"] * 3,
-    *["the person"] * 2,
-    "a figure",
-    "somebody",
-    "the man",
-    "the woman",
-    "a guy",
-    "a boy",
-    "a girl",
-    "a child",
-    "a kid",
-    "an old man",
-    "a young woman",
-    "a lady",
-    "a dancer",
-    "an athlete",
-    "a fighter",
-    "a soldier",
-    "a worker",
-    "a player",
-    "a character",
-)
+_PEOPLE: list[str] = _WORDS["people"]
 
 
 def sentence(verb_phrase: str, rng: np.random.Generator) -> str:
@@ -114,27 +91,7 @@ def _ing(word: str) -> str:
     return base + base[-1] * (base in _DOUBLED) + "ing"
 
 
-_DOUBLED = {
-    *("begin", "bob", "clap", "dip", "drop", "flip", "get", "grab", "hit", "hop", "hug", "jog", "lob", "mop", "nod"),
-    *(
-        "put",
-        "rub",
-        "run",
-        "set",
-        "sidestep",
-        "sip",
-        "sit",
-        "skip",
-        "slip",
-        "spin",
-        "squat",
-        "step",
-        "stop",
-        "tap",
-        "trip",
-    ),
-}
-"""Verbs whose last letter is doubled before -ing."""
+_DOUBLED = frozenset(_WORDS["doubled"])
 _NO_VERBS = {"arms", "forwards", "hands", "knees", "legs", "sideways"}
 """What ends with s behind "and" and is no verb."""
 

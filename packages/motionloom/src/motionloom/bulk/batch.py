@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -233,7 +233,6 @@ def _is_done(head: Head, rows: list[bytes]) -> bool:
 
 def _found(options: Options) -> Options:
     """The options with whole paths: other processes may be elsewhere."""
-    from dataclasses import replace
 
     def whole(name: str | None) -> str | None:
         return str(Path(name).resolve()) if name is not None and Path(name).is_file() else name

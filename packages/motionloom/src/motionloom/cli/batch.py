@@ -1,8 +1,12 @@
 """`motionloom batch`: a file of jobs to a folder of motions."""
 
 import argparse
+import json
 import sys
+import time
+from collections import Counter
 from contextlib import ExitStack
+from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -118,8 +122,6 @@ def _verify(arguments: argparse.Namespace) -> int:
         fail("--verify FOLDER looks at a batch and makes nothing; give it without jobs and --out")
     found = verify(arguments.verify)
     if arguments.json:
-        import json
-
         print(json.dumps(vars(found) | {"damaged": [str(path) for path in found.damaged]}, indent=1))
     else:
         for path in found.damaged:
@@ -153,8 +155,6 @@ def _jobs(arguments: argparse.Namespace) -> "Jobs":
 
 
 def _options(arguments: argparse.Namespace) -> "Options":
-    from dataclasses import fields
-
     from motionloom.bulk.maker import Options
     from motionloom.bulk.measures import Filter
 
@@ -197,8 +197,6 @@ def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", w
     set_threads(1)
     found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
     if arguments.json:
-        import json
-
         about = vars(found) | {"hours": found.hours, "gigabytes": found.gigabytes}
         print(json.dumps(about, indent=1))
         return
@@ -212,8 +210,6 @@ def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", w
 
 
 def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, where: "Where", rows: int) -> int:
-    from collections import Counter
-
     from motionloom.bulk.batch import run
 
     counts: Counter[str] = Counter()
@@ -231,8 +227,6 @@ def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, wh
     for problem in problems:
         print(f"motionloom: {problem}", file=sys.stderr)
     if arguments.json:
-        import json
-
         print(json.dumps({"folder": str(arguments.out), "tried": made, **counts}, indent=1))
     else:
         _say(arguments.out, counts, made)
@@ -259,8 +253,6 @@ class _Progress:
     """How far a batch is, at which rate, and how long it will take: a bar on a terminal, else a line now and then."""
 
     def __init__(self, rows: int) -> None:
-        import time
-
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -1,8 +1,11 @@
 """`motionloom compose`: a long motion from a timeline file or from several prompts."""
 
 import argparse
+import json
 import sys
 from collections.abc import Generator, Iterable, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +15,7 @@ from motionloom.cli.robots import metres_told
 from motionloom.cli.sampling import add_sampling, check_outs, fail, load_prior, remark_unknown, request_of, results
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
+from motionloom.errors import MotionloomError
 from motionloom.requests.compose import Compose
 from motionloom.requests.reading import settled
 from motionloom.requests.shared import FINISH
@@ -49,8 +53,6 @@ def add(subparsers) -> None:
 
 
 def _compose(arguments: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     outs, target = ([], None) if arguments.check else check_outs(arguments)
     metre = 1.0 if target is None else target.metre
     timeline = _timeline(arguments, metre)
@@ -132,9 +134,6 @@ def _make(
     from motionloom.kinematics.deeds import LONGEST
 
     told = arguments.json and timeline.seconds <= LONGEST
-    from contextlib import closing
-
-    from motionloom.errors import MotionloomError
     from motionloom.interruption import held_back
 
     try:
@@ -163,8 +162,6 @@ def _kept_in(shown: "list[Motion]", pieces: Iterable["Motion"]) -> Generator["Mo
 
 
 def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float | None) -> None:
-    from contextlib import ExitStack
-
     from motionloom.interruption import held_back
     from motionloom.io.stream import resampled
 
@@ -219,8 +216,6 @@ def _report(
         if begin < seconds
     ]
     if arguments.json:
-        import json
-
         files = [str(stream.path) for stream in streams]
         about = {"seconds": seconds, "of": timeline.seconds, "files": files, "segments": rows}
         about |= {"remarks": list(remarks), "happened": list(happened)}

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -146,8 +147,6 @@ def _told(goal: "Goal", metre: float) -> str:
 def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
     """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a clip that
     is followed is the person's anyway."""
-    from dataclasses import replace
-
     from motionloom.cli.reading import load_motion
     from motionloom.goals.goal import FPS, merged
     from motionloom.goals.goal_file import follow, read_goal

@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.two_bodies import two_body_measures, two_body_remarks
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
+from motionloom.errors import MotionloomError
 from motionloom.formats import characters, writable
 from motionloom.requests.duet import Duet
 from motionloom.requests.shared import FINISH, SAMPLED
@@ -194,7 +195,6 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
 
 
 def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
-    from motionloom.errors import MotionloomError
     from motionloom.goals.roles import prompts_of
     from motionloom.goals.timeline import read_timeline
     from motionloom.io.lined_yaml import fail as fail_at
@@ -230,7 +230,6 @@ def _goals(arguments: argparse.Namespace, metre: float) -> "tuple[Goal | None, G
 
 def _goal(arguments: argparse.Namespace, path: Path, metre: float) -> "Goal":
     """What somebody is asked: a goal file, such a mapping in YAML, or a drawn line."""
-    from motionloom.errors import MotionloomError
     from motionloom.goals.goal import FPS
     from motionloom.goals.goal_file import read_goal
     from motionloom.io.lined_yaml import read_lined

@@ -1,7 +1,9 @@
 """Commands about motion files: export, view, info."""
 
 import argparse
+import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +19,11 @@ from motionloom.cli.reading import (
 )
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
+from motionloom.errors import MotionloomError
 from motionloom.formats import readable, writable
 from motionloom.requests.export import Stretch
 
 if TYPE_CHECKING:
-    from motionloom.kinematics.deeds import Deeds
     from motionloom.motion import Motion
 
 
@@ -83,7 +85,6 @@ def run_export(arguments: argparse.Namespace) -> int:
     """``motionloom export IN OUT``."""
     from motionloom import io
     from motionloom.cli.robots import check_inputs
-    from motionloom.errors import MotionloomError
 
     if arguments.check:
         return check_inputs(arguments)
@@ -153,7 +154,6 @@ def _exported(
 def run_view(arguments: argparse.Namespace) -> None:
     """``motionloom view FILE ...``."""
     from motionloom import io
-    from motionloom.errors import MotionloomError
 
     target = arguments.out or Path(f"{arguments.inputs[0].stem}.png")
     if target.suffix.lower() not in (".png", ".mp4", ".gif", ".html"):
@@ -209,9 +209,6 @@ def _people(arguments: argparse.Namespace, path: Path) -> "list[Motion]":
 
 def run_info(arguments: argparse.Namespace) -> None:
     """``motionloom info FILE``."""
-    import json
-    from dataclasses import asdict
-
     from motionloom.io.info import describe
     from motionloom.kinematics.deeds import measure_deeds
 
@@ -243,17 +240,6 @@ def run_info(arguments: argparse.Namespace) -> None:
         print(f"  problem   {problem}")
 
 
-def _deeds(motion: "Motion") -> "Deeds | None":
-    """What the person of a motion does; None where there is none."""
-    from motionloom.errors import MotionloomError
-    from motionloom.kinematics.deeds import measure_deeds
-
-    try:
-        return measure_deeds(motion)
-    except MotionloomError:
-        return None
-
-
 def _clips(path: Path) -> list[tuple[str, float]]:
     """Name and seconds of each animation of a glTF file."""
     from motionloom.io import GLTF
@@ -269,7 +255,6 @@ def _summary(motion: "Motion") -> str:
 
 def _files(arguments: argparse.Namespace) -> tuple[list[Path], Path]:
     """What is read, and where to write, whether that is named as OUT or with ``--out``."""
-    from motionloom.errors import MotionloomError
 
     if arguments.out is not None:
         return arguments.inputs, arguments.out
@@ -279,7 +264,6 @@ def _files(arguments: argparse.Namespace) -> tuple[list[Path], Path]:
 
 
 def _only_bvh(arguments: argparse.Namespace, target: Path) -> None:
-    from motionloom.errors import MotionloomError
 
     if arguments.out_unit or arguments.order:
         raise MotionloomError(f"--out-unit and --order are for BVH files; {target} is none")

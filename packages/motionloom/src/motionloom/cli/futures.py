@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from motionloom.cli.sampling import fail, numbered
 from motionloom.cli.skeletons import Target as Skin
 from motionloom.cli.skeletons import open_target, put_all
+from motionloom.errors import MotionloomError
 from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
@@ -88,7 +89,6 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
 
 def _film() -> str:
     """Name of a folder's film: a .gif where there is no ffmpeg for an .mp4."""
-    from motionloom.errors import MotionloomError
     from motionloom.io import check_program
 
     try:
@@ -164,7 +164,6 @@ class Long:
 
         A failure in between leaves what was finished too, and its message says so.
         """
-        from motionloom.errors import MotionloomError
         from motionloom.io.folder import atomic_folder
 
         problem: BaseException | None = None

@@ -1,8 +1,11 @@
 """`motionloom live`: a scripted session with one or two people who are steered, to files or against the clock."""
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -143,8 +146,6 @@ def _write(
     unit: float | None,
 ) -> list[Path]:
     """The files of one person, with the words of each frame; a picture shows each stretch of the same in a row."""
-    from itertools import groupby
-
     (whole,) = motions
     stretches: list[tuple[str, Motion]] = []
     begin = 0
@@ -180,11 +181,7 @@ def _report(
     health: "Health | None",
     made: dict[str, Any],
 ) -> None:
-    from dataclasses import asdict
-
     if arguments.json:
-        import json
-
         about = {"seconds": script.seconds, "commands": len(script.commands), "files": [str(path) for path in written]}
         print(json.dumps({**about, **made, **({"clock": asdict(health)} if health else {})}, indent=1))
         return

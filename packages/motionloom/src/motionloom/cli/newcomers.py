@@ -5,6 +5,8 @@ import difflib
 import sys
 from collections.abc import Iterable, Sequence
 
+from motionloom.errors import MotionloomError
+
 COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
 OPTIONS = {"--length": "--seconds", "--duration": "--seconds", "-o": "--out", "--output": "--out", "-n": "--count"}
 RENAMED = {
@@ -24,7 +26,6 @@ def with_command(words: Sequence[str], commands: Iterable[str]) -> list[str]:
 
     Raises `MotionloomError` where the first word is no command.
     """
-    from motionloom.errors import MotionloomError
 
     known, found = list(commands), list(words)
     if not found or found[0].startswith("-") or found[0] in known:

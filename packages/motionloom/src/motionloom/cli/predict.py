@@ -1,8 +1,11 @@
 """`motionloom predict` and `motionloom switch`: what may come after a motion, and the way from one to another."""
 
 import argparse
+import json
 import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -194,8 +197,6 @@ def _predict_long(
     arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "FixedJoints | None", long: Long
 ) -> int:
     """One future after the other, in memory that does not grow with their length."""
-    from contextlib import closing
-
     if past.translations is not None:
         fail(
             f"the bones of {arguments.past} change length, and such a motion cannot be written piece by piece; predict "
@@ -284,8 +285,6 @@ def _read_past(
 
 def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
     """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
-    from dataclasses import replace
-
     import numpy as np
 
     from motionloom.retarget import retarget
@@ -405,8 +404,6 @@ def _note_seen(predictor: "Predictor", past: "Motion") -> None:
 
 def _report(arguments: argparse.Namespace, written: list[str], count: int, happened: Sequence[Any] = ()) -> None:
     if arguments.json:
-        import json
-
         about = {
             "past": str(arguments.past),
             "seconds": arguments.seconds,

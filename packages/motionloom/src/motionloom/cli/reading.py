@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.options import add_options
+from motionloom.errors import MotionloomError
 from motionloom.formats import with_clips
 from motionloom.requests.export import Source, Stretch
 from motionloom.requests.shared import OnRobot
@@ -88,7 +89,6 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
     """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
     from motionloom import io
     from motionloom.cli.robots import read_motion, reads_as_clip
-    from motionloom.errors import MotionloomError
 
     if reads_as_clip(arguments, path):
         return read_motion(arguments, path), None, {}
@@ -119,7 +119,6 @@ def load_motion(arguments: argparse.Namespace, path: Path) -> "Motion":
 
 def _upright(motion: "Motion", path: Path, arguments: argparse.Namespace) -> "Motion":
     """The motion with +Y up, as the line says or as people stand; a remark where the file was turned."""
-    from motionloom.errors import MotionloomError
     from motionloom.retarget.upright import stood_up, up_axis
 
     wanted = arguments.up
@@ -146,7 +145,6 @@ HUMAN_LEGS = (0.5, 1.3)
 
 def check_size(arguments: argparse.Namespace, path: Path, motion: "Motion") -> None:
     """Ask for the unit where bones are of no human length; a file of our own (.npz) or in a stated unit is believed."""
-    from motionloom.errors import MotionloomError
     from motionloom.retarget.anatomy import read_body
 
     if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):

@@ -1,6 +1,7 @@
 """Robots on the command line: ``--robot`` of the commands that read and write motions, and ``robot-check``."""
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from motionloom.cli.skeletons import Target
+from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -103,7 +105,6 @@ class RobotTarget(Target):
 
     def clip(self, motion: "Motion", path: Path) -> "Clip":
         """The motion as the robot does it, with a line on stderr about what became of it."""
-        from motionloom.errors import MotionloomError
         from motionloom.robots.clip import put_on_robot
         from motionloom.robots.figures import measure
 
@@ -127,8 +128,6 @@ class RobotTarget(Target):
         for fault in figures.faults():
             print(f"note: {path}: {fault}", file=sys.stderr)
         if self.figures:
-            import json
-
             print(json.dumps({"file": str(path), **figures.as_dict()}))
         return clip
 
@@ -141,7 +140,6 @@ def metres_told(metre: float) -> str:
 
 def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
     """What ``--robot`` and its options say."""
-    from motionloom.errors import MotionloomError
     from motionloom.robots.clip import FPS, check_settings
 
     for name in ("skeleton", "root", "hands", "at", "clip_name", "replace", "one_file", "target_map"):
@@ -176,7 +174,6 @@ def opened(arguments: argparse.Namespace) -> "Robot":
 
 def reads_as_clip(arguments: argparse.Namespace, path: Path) -> bool:
     """Whether a file holds joint angles of a robot; refuses one where the line names no robot."""
-    from motionloom.errors import MotionloomError
 
     if path.suffix.lower() not in OUTS:
         return False
@@ -229,10 +226,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def run_check(arguments: argparse.Namespace) -> int:
     """``motionloom robot-check FILE --robot MODEL``; 0 where every figure is within its limit, else 1."""
-    import json
-
     from motionloom.cli.reading import crop, read_clip
-    from motionloom.errors import MotionloomError
     from motionloom.robots.clip import FPS, check_settings, put_on_robot
     from motionloom.robots.figures import measure
     from motionloom.robots.physics import track
@@ -271,7 +265,6 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 def check_inputs(arguments: argparse.Namespace) -> int:
     """``motionloom export FILE --robot MODEL --check``: as `run_check`, in JSON; nothing is written."""
-    from motionloom.errors import MotionloomError
 
     if arguments.robot is None or len(arguments.inputs) != 1 or arguments.out is not None or arguments.mirror:
         raise MotionloomError("--check says how good a robot's clip is; give one file, its --robot, and no OUT")

@@ -1,6 +1,7 @@
 """What the commands that make motions share: options, the checks of them, a progress bar."""
 
 import argparse
+import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from motionloom.cli.options import add_options
 from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.cli.writing import add_writing, check_rate, check_unit
+from motionloom.errors import MotionloomError
 from motionloom.formats import writable
 from motionloom.requests.fields import specs
 from motionloom.requests.generate import Generate
@@ -118,7 +120,6 @@ def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
 
 def fail(message: str) -> NoReturn:
     """Raise a `MotionloomError`."""
-    from motionloom.errors import MotionloomError
 
     raise MotionloomError(message)
 
@@ -191,8 +192,6 @@ def write(
 def report(arguments: argparse.Namespace, about: dict[str, Any], written: Sequence[Path], seconds: float) -> None:
     """Say what was written in ``seconds`` of drawing: a line each, or as JSON behind ``about``."""
     if arguments.json:
-        import json
-
         files = [str(path) for path in written]
         print(json.dumps(about | {"files": files, "sampling_seconds": round(seconds, 3)}, indent=1))
         return

@@ -5,11 +5,13 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_robot
+from motionloom.errors import MotionloomError
 from motionloom.formats import characters, find, readable
 from motionloom.requests.export import OnSkeleton
 
@@ -90,7 +92,6 @@ class Target:
         source: str = "the motion",
         source_map: Path | None = None,
     ) -> "Motion":
-        from motionloom.errors import MotionloomError
         from motionloom.retarget import retarget
         from motionloom.retarget.anatomy import read_body
         from motionloom.retarget.hands import pose_hands
@@ -154,7 +155,6 @@ class Target:
 
     def names(self, captions: Sequence[str]) -> list[str]:
         """What motions of these captions are called in the character's file; refuses names of another count."""
-        from motionloom.errors import MotionloomError
 
         if len(self.clip_names) not in (0, 1, len(captions)):
             needed = (
@@ -217,7 +217,6 @@ class Target:
             return character.save_clips(clips, path, replace=self.replace)
         import tempfile
 
-        from motionloom.errors import MotionloomError
         from motionloom.io.blender import glb_to_fbx
 
         if ".glb" not in character.suffixes:
@@ -247,7 +246,6 @@ def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> 
 
 def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
     """The skeleton that the line names, if it does; refuses options and files that do not go with it."""
-    from motionloom.errors import MotionloomError
 
     if arguments.robot is not None:
         from motionloom.cli.robots import read_robot_target
@@ -288,8 +286,6 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
 def _note_place(target: Target) -> None:
     """Say where motions start, where the line does not and it is not the origin."""
     if target.at is None and target.place is not None:
-        from math import degrees
-
         place = target.place
         print(
             f"note: {target.name} stands at x {place.x:.2f}, z {place.z:.2f} m and faces {degrees(place.facing):.0f} "
@@ -317,7 +313,6 @@ def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None
 
 def _check_humanoid(target: Target) -> None:
     """Refuse a skeleton that is no person, or has no fingers for ``--hands``, before anything is drawn."""
-    from motionloom.errors import MotionloomError
     from motionloom.retarget.anatomy import read_body
     from motionloom.retarget.hands import check_fingers
 
@@ -337,7 +332,6 @@ def _check_humanoid(target: Target) -> None:
 
 def _find(arguments: argparse.Namespace) -> Target:
     from motionloom import io
-    from motionloom.errors import MotionloomError
     from motionloom.retarget.named import NAMED, named_skeleton
 
     name, path = arguments.skeleton, Path(arguments.skeleton)

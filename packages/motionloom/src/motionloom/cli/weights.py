@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
     from motionloom.weights.predictor import Predictor
@@ -39,7 +40,6 @@ def add(subparsers) -> None:
 
 
 def _weights(arguments: argparse.Namespace) -> None:
-    from motionloom.errors import MotionloomError
     from motionloom.weights.pair import blocks
     from motionloom.weights.predictor import shipped_predictors
     from motionloom.weights.prior import find_weights, shipped
@@ -74,7 +74,6 @@ def _weights(arguments: argparse.Namespace) -> None:
 
 def _convert(arguments: argparse.Namespace) -> None:
     """Write an older file again with graphs; raises MotionloomError where it cannot be, or PyTorch is missing."""
-    from motionloom.errors import MotionloomError
     from motionloom.io.atomic import check_place
 
     if len(arguments.weights) != 3 or arguments.actions or arguments.json:
@@ -94,7 +93,6 @@ def _convert(arguments: argparse.Namespace) -> None:
 
 def _actions(arguments: argparse.Namespace) -> None:
     """Print what a prior has learned; raises MotionloomError for weights that do not say."""
-    from motionloom.errors import MotionloomError
     from motionloom.weights.prior import Prior
 
     weights = arguments.weights[0] if arguments.weights else "default"
@@ -115,12 +113,10 @@ def _actions(arguments: argparse.Namespace) -> None:
 
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
-    from motionloom.weights.adapter import is_adapter
-    from motionloom.weights.pair import is_block
-    from motionloom.weights.predictor import is_predictor
+    from motionloom.weights.container import ADAPTERS, PAIRS, PREDICTORS
 
-    kinds = ((is_predictor, _predictor), (is_block, _block), (is_adapter, _adapter))
-    said = next((read for kind, read in kinds if kind(path)), _prior)(path)
+    kinds = ((PREDICTORS, _predictor), (PAIRS, _block), (ADAPTERS, _adapter))
+    said = next((read for kind, read in kinds if kind.signed(path)), _prior)(path)
     about = {"name": said["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | said
     return about if name is None else about | {"name": name}
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.reading import add_blender, as_unit
+from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -28,7 +29,6 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 
 def check_rate(arguments: argparse.Namespace) -> None:
     """Refuse a ``--fps`` that cannot be."""
-    from motionloom.errors import MotionloomError
 
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         raise MotionloomError(f"--fps must be 1 to 1000; got {arguments.fps:g}")
@@ -36,7 +36,6 @@ def check_rate(arguments: argparse.Namespace) -> None:
 
 def check_unit(arguments: argparse.Namespace, files: Sequence[Path]) -> None:
     """Refuse an ``--out-unit`` where no BVH is written: the other formats state their unit."""
-    from motionloom.errors import MotionloomError
 
     if arguments.out_unit is not None and not any(file.suffix.lower() == ".bvh" for file in files):
         raise MotionloomError(f"--out-unit is for BVH files; {', '.join(map(str, files[:3]))} is none")
@@ -52,7 +51,6 @@ def check_overwriting(arguments: argparse.Namespace, files: Iterable[Path], *, a
 
     ``also`` are files that are read and not on the line. Raises `MotionloomError` naming the file that is both.
     """
-    from motionloom.errors import MotionloomError
 
     read = {path.resolve() for path in (*_inputs(arguments), *also)}
     for file in files:

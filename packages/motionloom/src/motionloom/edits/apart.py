@@ -24,6 +24,8 @@ LOOSE = 0.01
 """Metres: how exactly what a frame needs is done at once."""
 ROUNDS, STEPS = 3, 6
 """How often what is left is looked for, and how many steps a frame is moved in until nothing overlaps."""
+FAR = 2.2
+"""Metres between two people of whom nothing can overlap."""
 MOST = 160
 """Frames that are looked at; of more, evenly many."""
 EVEN, LONG, NEAR = 7, 81, 0.2
@@ -61,24 +63,18 @@ def shift_apart(places: Array, *, still: int = 0, close: tuple[int, int] = (0, 0
     if close[1]:
         ease *= smoothstep(np.maximum(close[0] - looked, looked - close[1] + 1) / WIDTH)
     rest = np.concatenate([np.arange(max(still - 2, 0), still), np.arange(*close, 4)])
-    if _far(places):
+    if (np.linalg.norm(places[1, :, 0] - places[0, :, 0], axis=-1) > FAR).all():
         return shift
     ends = [capsule_ends(one[looked])[:, _CORE] for one in places]
     line = _line(places)[looked]
     for _ in range(ROUNDS):
-        need = _need(ends[0], ends[1] + _level(shift[looked])[:, None, None], line)
+        need = _need(ends[0], ends[1] + np.insert(shift[looked], 1, 0.0, axis=-1)[:, None, None], line)
         need *= ease  # what overlaps already cannot come apart at once
         at = np.flatnonzero(need)
         if not len(at):
             break
         shift[still:] += _slow(frames, looked[at], line[at], need[at], rest)[still:]
     return shift
-
-
-def _far(places: Array) -> bool:
-    """Whether the two are so far from each other that nothing can overlap."""
-    apart = np.linalg.norm(np.diff(places[:, :, 0], axis=0)[0], axis=-1)
-    return bool((apart > 2.2).all())
 
 
 def _line(places: Array) -> Array:
@@ -89,8 +85,8 @@ def _line(places: Array) -> Array:
     trunks = places[:, :, _TRUNK].mean(axis=2)[..., [0, 2]]
     across = places[0, :, J["left_hip"]] - places[0, :, J["right_hip"]]
     ahead = np.stack([-across[:, 2], across[:, 0]], axis=-1).mean(axis=0)
-    apart = _even(trunks[1] - trunks[0], EVEN)
-    around = _unit(_even(apart, LONG) + _ASIDE * _unit(ahead))
+    apart = even(trunks[1] - trunks[0], EVEN)
+    around = _unit(even(apart, LONG) + _ASIDE * _unit(ahead))
     sure = (np.linalg.norm(apart, axis=-1, keepdims=True) / NEAR).clip(0.0, 1.0)
     return _unit(sure * apart + (1 - sure) * NEAR * around)
 
@@ -99,7 +95,7 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True).clip(1e-9)
 
 
-def _even(values: Array, width: int) -> Array:
+def even(values: Array, width: int) -> Array:
     """(frames, 2) averaged over ``width`` frames, an odd number; ends repeated."""
     padded = np.pad(values, ((width // 2, width // 2), (0, 0)), mode="edge")
     return np.stack([np.convolve(column, np.ones(width) / width, "valid") for column in padded.T], axis=-1)
@@ -113,7 +109,7 @@ def _need(first: Array, second: Array, line: Array) -> Array:
     need = np.zeros(len(line))
     at = np.arange(len(line))
     for _ in range(STEPS):
-        moved = second[at] + _level(need[at, None] * line[at])[:, None, None]
+        moved = second[at] + np.insert(need[at, None] * line[at], 1, 0.0, axis=-1)[:, None, None]
         deep = -gaps(first[at], RADII[_CORE], moved, RADII[_CORE]).min(axis=(1, 2))
         at, deep = at[deep > 1e-3], deep[deep > 1e-3]
         if not len(at):
@@ -134,8 +130,3 @@ def _slow(frames: int, at: NDArray[np.intp], line: Array, need: Array, rest: NDA
     curve = covariance @ (np.linalg.solve(inner, asked)[:, None] * ways)
     curve *= (need.max() / np.linalg.norm(curve, axis=-1, keepdims=True).clip(1e-9)).clip(max=1.0)
     return np.asarray(curve, dtype=np.float64)
-
-
-def _level(ground: Array) -> Array:
-    """(..., 3) of x and z (..., 2)."""
-    return np.stack([ground[..., 0], np.zeros(ground.shape[:-1]), ground[..., 1]], axis=-1)

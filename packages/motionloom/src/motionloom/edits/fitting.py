@@ -25,7 +25,6 @@ from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 ROUND = 30
 """Frames before and after a target that may change."""

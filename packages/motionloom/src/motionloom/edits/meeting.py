@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
-from motionloom.edits.apart import shift_apart
+from motionloom.edits.apart import even, shift_apart
 from motionloom.edits.fitting import fit
 from motionloom.edits.pair_motion import PairMotion
 from motionloom.edits.relative_pose import lacking
@@ -70,13 +70,12 @@ class Meeting:
         at = np.arange(first, max(last, first + 1))
         late = LATE * np.abs(np.linspace(-1.0, 1.0, len(at)))
         ways = self.contact.ways
-        far = [late + sum(self._distance(places[:, at], touch) / len(way) for touch in way) for way in ways]
+        far = []
+        for way in ways:
+            apart = [places[one.person, at, one.joint] - places[1 - one.person, at, one.other] for one in way]
+            far.append(late + sum(np.linalg.norm(line, axis=-1) / len(way) for line in apart))
         chosen = int(np.argmin([one.min() for one in far]))
         self.way, self.frame = ways[chosen], int(at[far[chosen].argmin()])
-
-    def _distance(self, places: Array, touch: Touch) -> Array:
-        ends = places[touch.person, :, touch.joint], places[1 - touch.person, :, touch.other]
-        return np.linalg.norm(ends[0] - ends[1], axis=-1)
 
     def near(self, pair: PairMotion, shares: Array) -> PairMotion:
         """The pair, as near to each other and turned as it takes; (2,) shares of the way, of sum 1 or 0."""
@@ -253,7 +252,7 @@ def arms_out(own: Array, other: Array) -> Goal:
         here = _at(arms[:, number], s[:, number][pick])
         there = _at(body[pick], t[:, number][pick])
         away = (here - there) / np.maximum(apart[:, number][pick], 1e-6)[:, None]
-        push = _even(np.where(inside[:, None], depth[:, None] * away, 0.0))
+        push = even(np.where(inside[:, None], depth[:, None] * away, 0.0), EVEN)
         for end, weight in zip(CAPSULES[arm][:2], (s[:, number][pick] < 0.9, s[:, number][pick] > 0.1), strict=True):
             joint = end[0][0]
             at = np.flatnonzero(inside & weight)
@@ -269,8 +268,3 @@ _BENDING = [joint for number in ARMS for joint, _ in CAPSULES[number][1]]
 def _at(ends: Array, share: Array) -> Array:
     """(frames, 3) on line segments (frames, 2, 3)."""
     return ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
-
-
-def _even(values: Array) -> Array:
-    padded = np.pad(values, ((EVEN // 2, EVEN // 2), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, np.ones(EVEN) / EVEN, "valid") for column in padded.T], axis=-1)

@@ -71,7 +71,8 @@ def toward(goal: Goal, prior: Prior, *, first: int = 0, known: bool = False) -> 
         noise = prior.schedule.at(level)[1]
         key = len(denoised), next(width for least, width in _WIDTHS if noise >= least)
         if key not in plans:
-            plans[key] = _plan(_in_row(goal, first, len(denoised)), first, key[1])
+            seen = goal.crop(0, min(len(goal), len(denoised) - first))
+            plans[key] = _plan(seen.padded(first, len(denoised) - first - len(seen)), first, key[1])
         features = denoised * std + mean
         changed = (_bent(features, plans[key], first if known else 0) - features) / std
         return denoised + changed.astype(denoised.dtype)
@@ -132,15 +133,11 @@ class _Plan:
     """(frames + 1, frames) covariance of the root's place where limbs can do it."""
 
 
-def _in_row(goal: Goal, first: int, frames: int) -> Goal:
-    part = goal.crop(0, min(len(goal), frames - first))
-    return part.padded(first, frames - first - len(part))
-
-
 def _plan(goal: Goal, first: int, width: float) -> _Plan:
     frames = len(goal)
     body = 0.8 * _bell(frames, width) + 0.2 * _bell(frames, 2.5)
-    pace = _summed(_bell(frames, width), first)
+    total = np.pad(_bell(frames, width).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    pace = total - total[first] - total[:, first : first + 1] + total[first, first]  # summed from ``first`` on and back
     moving = np.flatnonzero(goal.asked[..., [0, 2]].any(axis=(1, 2)))
     noise = np.where(goal.asked[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
     turning = np.flatnonzero(goal.facing_asked)
@@ -180,12 +177,6 @@ def _bell(frames: int, width: float) -> Array:
     return np.exp(-0.5 * (lag / width) ** 2)
 
 
-def _summed(velocity: Array, first: int) -> Array:
-    """(frames + 1, frames + 1) covariance of what a velocity adds up to, from frame ``first`` on and back from it."""
-    total = np.pad(velocity.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
-    return total - total[first] - total[:, first : first + 1] + total[first, first]
-
-
 def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
     """(rows, asked): the posterior mean from what is seen at ``asked``, with noise of these standard deviations."""
     if not len(asked):
@@ -197,23 +188,15 @@ def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
 def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
     if not asked.any():
         return None
-    t, j = np.nonzero(_thinned(asked))
+    busy, stride = np.flatnonzero(asked.any(axis=1)), 1
+    while int(asked[busy[::stride]].sum()) > MOST:
+        stride += 1
+    t, j = np.nonzero(asked & np.isin(np.arange(len(asked)), busy[::stride])[:, None])
     inner = body[np.ix_(t, t)] * together[np.ix_(j, j)]
     if still is not None:
         inner += still[np.ix_(t, t)]
     inner[np.diag_indices_from(inner)] += EXACT**2
     return _Limbs((t, j), np.asarray(np.linalg.inv(inner), dtype=np.float64), together)
-
-
-def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(frames, 22) with at most `MOST` targets, in frames spread evenly: those between follow by smoothness."""
-    busy = np.flatnonzero(asked.any(axis=1))
-    stride = 1
-    while int(asked[busy[::stride]].sum()) > MOST:
-        stride += 1
-    kept = np.zeros_like(asked)
-    kept[busy[::stride]] = asked[busy[::stride]]
-    return kept
 
 
 def _offsets() -> Array:
@@ -276,9 +259,8 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
         local[..., 1] += np.outer(product(plan.lift, need), _CARRIED)
         goal, denoised = lowered(goal, places, room), replace(denoised, local=local)
     if len(plan.turning):
-        denoised = replace(
-            denoised, facing=facing + product(plan.turn, _facing_error(denoised.world(), plan.goal)[plan.turning])
-        )
+        off = turn_between(goal.facing[plan.turning], heading(denoised.world())[plan.turning])
+        denoised = replace(denoised, facing=facing + product(plan.turn, np.unwrap(off)))
     error = np.where(goal.asked, goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
     error[:, 1:] *= np.minimum(1.0, _LONGEST / far.clip(1e-9))
@@ -380,14 +362,6 @@ def _turning_with(old: Array, new: Array, first: int) -> Array:
     angle = np.unwrap(np.angle(turn))
     start = np.arange(len(turn)) - first
     return (angle - 2 * np.pi * np.round(angle[first] / (2 * np.pi))) * (1 - np.exp(-0.5 * (start / _TURN_OVER) ** 2))
-
-
-def _facing_error(places: Array, goal: Goal) -> Array:
-    """(frames,) radians between the facing asked and that of hips and shoulders."""
-    error = np.zeros(len(goal))
-    at = np.flatnonzero(goal.facing_asked)
-    error[at] = np.unwrap(turn_between(goal.facing[at], heading(places)[at]))
-    return error
 
 
 _SLACKS = np.array([0.0, *(_SLACK.get(joint, costs.TRUNK_SLACK) for joint in range(1, len(SMPL22)))])

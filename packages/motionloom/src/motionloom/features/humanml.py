@@ -42,6 +42,7 @@ _CHAINS = (
     (9, 13, 16, 18, 20),
 )
 _PARENTS = np.array(SMPL22.parents)
+_FORWARD = np.array([0.0, 0.0, 1.0])
 _MIRROR = list(SMPL22.mirror_pairs())
 
 
@@ -94,7 +95,7 @@ def canonical(positions: np.ndarray) -> Array:
     positions = _checked(positions)
     positions = positions - [0, positions[..., 1].min(), 0]
     positions = positions - positions[0, 0] * [1, 0, 1]
-    turn = _to_forward(_facing(positions[:1], swapped_hips=False))
+    turn = rot.shortest_arc(_facing(positions[:1], swapped_hips=False), _FORWARD)
     return rot.rotate(turn[:, None], positions)
 
 
@@ -106,7 +107,7 @@ def heading_quaternions(positions: np.ndarray, *, heading: Heading = "compatible
     if heading not in ("compatible", "corrected"):
         raise MotionloomError(f"heading must be 'compatible' or 'corrected'; got {heading!r}")
     facing = _smooth(_facing(positions, swapped_hips=heading == "compatible"))
-    result = _to_forward(facing)
+    result = rot.shortest_arc(facing, _FORWARD)
     if heading == "compatible":
         result[0] = rot.IDENTITY
     return result
@@ -320,10 +321,6 @@ def _smooth(facing: np.ndarray) -> Array:
     kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / SMOOTHING) ** 2)
     padded = np.pad(facing, ((radius, radius), (0, 0)), mode="edge")
     return np.stack([np.convolve(column, kernel / kernel.sum(), "valid") for column in padded.T], axis=-1)
-
-
-def _to_forward(facing: np.ndarray) -> Array:
-    return rot.shortest_arc(facing, np.array([0.0, 0.0, 1.0]))
 
 
 def _later(x: Numbers) -> Numbers:

@@ -147,7 +147,7 @@ class PlaceCode:
         # the first person as the second sees him, turned round: the second as the first sees him
         x2, z2 = -(c * second[..., 2] + s * second[..., 3]), -(c * second[..., 3] - s * second[..., 2])
         other = stack(c, s, (first[..., 2] + x2) / 2, (first[..., 3] + z2) / 2)
-        return _pile(stack(1 + 0 * c, 0 * s, 0 * x, 0 * z), other)
+        return namespace(other).stack((stack(1 + 0 * c, 0 * s, 0 * x, 0 * z), other), axis=-2)
 
 
 PUBLISHED_CODE = PlaceCode("world", 0.1, 0.1)
@@ -162,11 +162,8 @@ def as_published(poses: Numbers) -> Numbers:
     """
     first, second = poses[..., 0, :], poses[..., 1, :]
     turned = relative(first, second)
-    return _pile(relative(first, first), stack(turned[..., 0], turned[..., 1], *parts(second - first)[2:]))
-
-
-def _pile(first: Any, second: Any) -> Any:
-    return namespace(first).stack((first, second), axis=-2)
+    there = stack(turned[..., 0], turned[..., 1], *parts(second - first)[2:])
+    return namespace(poses).stack((relative(first, first), there), axis=-2)
 
 
 def _checked(positions: np.ndarray) -> Array:

@@ -1,104 +1,13 @@
 """Verbs in the words of prompts: their forms, what kind of action each names, and who does it."""
 
 import re
+import tomllib
+from importlib import resources
+from typing import Any
 
-_VERBS = {
-    "locomotion": "walk run jog sprint march stroll step stride skip tiptoe sneak crawl climb go come move "
-    "pace shuffle sidestep strafe limp stagger rush race swim back return enter leave approach wander hop gallop creep "
-    "stumble",
-    "gesture": "wave clap point nod shake salute raise lift swing stretch reach scratch rub hold carry drag push pull "
-    "bounce dribble look talk shout sing drink eat cheer flap cross fold shrug gesture touch wipe wash stir play "
-    "juggle smile laugh cry yawn beckon lower",
-    "state": "sit stand lie lay rest wait pause balance pose remain stay sleep lean",
-    "change": "kneel crouch bend fall stop rise collapse duck freeze halt straighten",
-    "event": "throw catch pick put place bow roll grab drop take toss pitch stoop cartwheel flip dive trip squat "
-    "lunge curtsy sneeze open close shoot notice discover hear",
-    "jump": "jump leap bound",
-    "turn": "turn spin twist rotate pivot circle twirl",
-    "fight": "kick punch box strike hit block dodge slash fight swipe chop jab",
-    "dance": "dance waltz salsa",
-    "other": "do make perform start begin continue keep try practice give get exercise act pretend",
-}
-_PAST = {
-    "sit": "sat",
-    "stand": "stood",
-    "lie": "lay",
-    "run": "ran",
-    "go": "went",
-    "come": "came",
-    "get": "got",
-    "kneel": "knelt",
-    "bend": "bent",
-    "throw": "threw",
-    "catch": "caught",
-    "swing": "swung",
-    "fall": "fell",
-    "take": "took",
-    "do": "did",
-    "make": "made",
-    "give": "gave",
-    "begin": "began",
-    "keep": "kept",
-    "put": "put",
-    "rise": "rose",
-    "creep": "crept",
-    "swim": "swam",
-    "hold": "held",
-    "drink": "drank",
-    "eat": "ate",
-    "sing": "sang",
-    "shake": "shook",
-    "leap": "leapt",
-    "spin": "spun",
-    "fight": "fought",
-    "hit": "hit",
-    "strike": "struck",
-    "leave": "left",
-    "sleep": "slept",
-    "shoot": "shot",
-    "hear": "heard",
-}
-_DOUBLED = {
-    "run",
-    "sit",
-    "jog",
-    "step",
-    "skip",
-    "hop",
-    "clap",
-    "nod",
-    "stop",
-    "get",
-    "spin",
-    "trip",
-    "drag",
-    "flap",
-    "shrug",
-    "put",
-    "swim",
-    "drop",
-    "flip",
-    "grab",
-    "rub",
-    "hit",
-    "chop",
-    "jab",
-    "begin",
-    "bet",
-}
-_CHANGED_BY = {
-    "sit": ("change", r"\b(down|up)\b"),
-    "stand": ("change", r"\bup\b"),
-    "lie": ("change", r"\bdown\b"),
-    "lay": ("change", r"\bdown\b"),
-    "get": ("change", r"\b(up|down|onto|off|out)\b"),
-    "take": ("change", r"\bseat\b"),
-    "lean": ("change", r"\bdown\b"),
-    "turn": ("event", r"\b(around|round|about|back|180)\b"),
-    "climb": ("event", r"\b(onto|over)\b"),
-    "come": ("change", r"\bto a (stop|halt)\b"),
-}
-"""What a word behind the verb makes of it."""
+_TABLES: dict[str, Any] = tomllib.loads(
+    (resources.files("motionloom.goals") / "verbs.toml").read_text(encoding="utf-8")
+)
 
 NOUNS_AFTER = {"do", "make", "perform", "throw", "take", "give", "practice", "play"}
 """Verbs behind which "kicks and punches" are things."""
@@ -114,13 +23,13 @@ _ADVERB = r"(?:(?:\w+ly|then|again|suddenly|once|twice|just|also|first|finally|s
 def _forms() -> dict[str, dict[str, str]]:
     """Of each mood ("third", "base", "past", "gerund") the forms with their base."""
     moods: dict[str, dict[str, str]] = {"third": {}, "base": {}, "past": {}, "gerund": {}}
-    for words in _VERBS.values():
-        for base in words.split():
+    for words in _TABLES["kinds"].values():
+        for base in words:
             moods["third"][_third(base)] = base
             moods["base"][base] = base
-            stem = base + base[-1] if base in _DOUBLED else base
+            stem = base + base[-1] if base in _TABLES["doubled"] else base
             past = f"{stem[:-1]}ied" if stem.endswith("y") and stem[-2] not in "aeo" else f"{stem.removesuffix('e')}ed"
-            moods["past"][_PAST.get(base, past)] = base
+            moods["past"][_TABLES["past"].get(base, past)] = base
             moods["gerund"]["lying" if base == "lie" else _gerund(stem)] = base
     return moods
 
@@ -136,7 +45,7 @@ def _gerund(stem: str) -> str:
 
 
 MOODS = _forms()
-_KINDS = {base: kind for kind, words in reversed(_VERBS.items()) for base in words.split()}
+_KINDS = {base: kind for kind, words in reversed(_TABLES["kinds"].items()) for base in words}
 
 
 def subject_of(clause: str) -> str:
@@ -194,7 +103,7 @@ def kind_of(item: str, mood: str) -> str:
 def kind_of_verb(word: str, said: str) -> str:
     """The kind of action that a verb names in what is ``said``: sitting down is a change, sitting a state."""
     base = base_of(word) or word
-    changed = _CHANGED_BY.get(base)
+    changed = _TABLES["changed_by"].get(base)
     if changed and re.search(changed[1], said):
         return changed[0]
     return _KINDS.get(base, "other")

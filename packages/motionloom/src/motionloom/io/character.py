@@ -10,6 +10,7 @@ import json
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -109,10 +110,17 @@ class Character:
         moved |= set() if replace else {key for channels in self.file.channels for key in channels}
         for (motion, name), own in zip(clips, keys, strict=True):
             held = self._held(moved - {(node, path_) for node, path_, _ in own})
-            animations.append(self._animation(new, motion, own, held) | {"name": _free_name(name or "motion", taken)})
-            taken.add(animations[-1]["name"])
+            name, numbers = name or "motion", count(2)
+            free = name
+            while free in taken:
+                free = f"{name}_{next(numbers)}"
+            animations.append(self._animation(new, motion, own, held) | {"name": free})
+            taken.add(free)
             for node, _, _ in own + held:
-                _use_parts(document["nodes"][node], self.nodes[node])
+                entry, rest = document["nodes"][node], self.nodes[node]
+                if entry.pop("matrix", None) is not None:  # of an animated node it must not be (glTF 2.0, 3.6.1)
+                    turn = np.roll(rest.turn, -1).tolist()
+                    entry |= {"translation": rest.place.tolist(), "rotation": turn, "scale": rest.scale.tolist()}
         document["animations"] = animations
         with atomic_path(path) as temporary:
             temporary.write_bytes(new.packed(self.path))
@@ -192,10 +200,6 @@ class Character:
             apart = np.abs(motion.translations - self.skeleton.offsets).max(axis=(0, 2)) > 1e-5
             free |= set(np.flatnonzero(apart).tolist())
         return free
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    return name if name not in taken else next(n for k in range(2, 10**6) if (n := f"{name}_{k}") not in taken)
 
 
 def load_character(path: str | Path, *, joint_map: Override | None = None) -> Character:
@@ -285,16 +289,6 @@ def _inside(now: Worlds, node: int, place: Array) -> Array:
         return rot.rotate(rot.inverse(now.turns[node]), apart)
     solved = np.linalg.solve(np.broadcast_to(linear, (len(apart), 3, 3)), apart[..., None])
     return np.asarray(solved[..., 0], dtype=np.float64)
-
-
-def _use_parts(entry: dict[str, Any], node: Node) -> None:
-    """An animated node must not have a matrix (glTF 2.0, 3.6.1): it becomes the same place, turn and scale."""
-    if entry.pop("matrix", None) is not None:
-        entry |= {
-            "translation": node.place.tolist(),
-            "rotation": np.roll(node.turn, -1).tolist(),
-            "scale": node.scale.tolist(),
-        }
 
 
 class _Insertion:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
@@ -17,7 +16,6 @@ from motionloom.io.gltf_nodes import Node, downwards, printable, read_nodes, rea
 from motionloom.io.gltf_rig import humanoid_nodes, posed, read_rig
 from motionloom.motion import Motion
 
-Array = NDArray[np.float64]
 MAX_JOINTS = 10_000
 MAX_SKINS = 64
 

@@ -73,7 +73,11 @@ def worlds(
         scale = sampled.get((n, "scale"), node.scale[None])
         stretch = found.linear.get(p)
         if p in found.places:
-            moved = _apply(stretch, place) if stretch is not None else rot.rotate(found.turns[p], place)
+            moved = (
+                np.einsum("...ab,...b->...a", stretch, place)
+                if stretch is not None
+                else rot.rotate(found.turns[p], place)
+            )
             place = found.places[p] + moved
         plain = stretch is None and np.abs(scale - 1.0).max() < 1e-9
         if not plain:
@@ -85,10 +89,6 @@ def worlds(
         found.places[n] = place
         found.turns[n] = rot.normalize(rot.multiply(found.turns[p], turn)) if p in found.turns else turn
     return found
-
-
-def _apply(linear: Array, vector: Array) -> Array:
-    return np.einsum("...ab,...b->...a", linear, vector)
 
 
 def read_rig(

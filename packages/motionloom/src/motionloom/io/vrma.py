@@ -11,7 +11,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.io.atomic import atomic_path
@@ -22,7 +21,6 @@ from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
 
-Array = NDArray[np.float64]
 _NEEDED = {"pelvis", "spine1", "head"} | {
     f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 }

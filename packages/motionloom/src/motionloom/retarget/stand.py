@@ -7,7 +7,6 @@ avatar faces -Z, another one was placed in a room, and their own clips leave the
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.ground import GroundPose
@@ -15,7 +14,6 @@ from motionloom.motion import Motion, ground_pose
 from motionloom.retarget.anatomy import Body, read_body
 from motionloom.skeleton import Skeleton
 
-Array = NDArray[np.float64]
 HERE = GroundPose()
 """At the origin, facing +Z: where most characters stand."""
 _NEAR = 0.15

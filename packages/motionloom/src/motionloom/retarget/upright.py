@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
@@ -11,7 +10,6 @@ from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.axes import FEET, HEAD, TOES
 from motionloom.retarget.joint_map import Override
 
-Array = NDArray[np.float64]
 TALL = 0.8
 """Cosine between a person and the axis along which they are upright."""
 OFTEN = 0.7

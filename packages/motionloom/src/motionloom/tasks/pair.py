@@ -98,7 +98,7 @@ def pair_features(
         MotionloomError: for what cannot be asked.
     """
     chosen, rows, given = PairSampling.of(sampling, settings), len(prompts), edits or PairEdits()
-    changes = list(given.corrections or [None] * rows)
+    changes, meetings = list(given.corrections or [None] * rows), given.meetings or [None] * (rows // 2)
     frozen = [one is not None for one in changes] if given.frozen is None else list(given.frozen)
     if rows % 2 or rows == 0 or {len(seeds), len(changes), len(frozen)} != {rows}:
         raise MotionloomError(
@@ -106,10 +106,11 @@ def pair_features(
         )
     known = False if given.observed is None else given.observed.mask
     mask = np.broadcast_to(known, (rows, 1 + frames, len(prior.mean)))
-    bodies = _bodies(mask, frozen, given.meetings)
+    bodies = [Bodies.of(mask[k : k + 2], frozen[k : k + 2], meetings[k // 2]) for k in range(0, rows, 2)]
 
     def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
-        return _corrected(state, [changes[i] for i in batch], level)
+        own = [changes[i] for i in batch]
+        return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], own, level)], axis=1) if any(own) else state
 
     def two_bodies(own: list[Bodies], state: np.ndarray, batch: list[int], level: int) -> np.ndarray:
         if not chosen.bodies or net.silent:
@@ -146,22 +147,6 @@ def pair_features(
         state = np.where(mask, given.observed.values, state)
     places, motion = part(two_bodies(bodies, corrected(state, range(rows), 0), list(range(rows)), 0))
     return people(motion * prior.std + prior.mean), net.places.decode(people(places))
-
-
-def _bodies(mask: np.ndarray, frozen: Sequence[bool], meetings: Sequence[Meeting | None] | None) -> list[Bodies]:
-    """How the two of each pair are kept apart, and how they touch."""
-    pairs = [slice(row, row + 2) for row in range(0, len(mask), 2)]
-    return [
-        Bodies.of(mask[pair], list(frozen[pair]), meeting)
-        for pair, meeting in zip(pairs, meetings or [None] * len(pairs), strict=True)
-    ]
-
-
-def _corrected(state: np.ndarray, corrections: Sequence[Correction | None], level: int) -> np.ndarray:
-    """Denoised states (rows, 1 + frames, 263) with the motion of each row corrected, if it is."""
-    if not any(corrections):
-        return state
-    return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], corrections, level)], axis=1)
 
 
 def _two_bodies(prior: Prior, net: PairSession, bodies: list[Bodies], state: np.ndarray, level: int) -> np.ndarray:

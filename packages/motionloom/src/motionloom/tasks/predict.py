@@ -33,7 +33,6 @@ __all__ = ["FixedJoints", "FixedPart", "predict", "predict_pieces", "switch"]
 
 Array = NDArray[np.float64]
 
-"""Seconds that are predicted at most."""
 WHOLE = 600.0
 """Seconds above which motions come in pieces only (`predict_pieces`)."""
 MOST = 6000.0

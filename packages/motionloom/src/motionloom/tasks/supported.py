@@ -27,7 +27,13 @@ def supported(motion: Motion) -> Motion:
     """
     places = motion.positions()
     moved = _grounded if hovering(places, motion.fps) else _on_stairs
-    return _above_floor(moved(motion, places))
+    motion = moved(motion, places)
+    places, goal = motion.positions(), Goal.nothing(len(motion))
+    for joint, rest in REST.items():
+        sunk = places[:, joint, 1] < rest - SUNK
+        goal.positions[sunk, joint, 1] = rest
+        goal.asked[sunk, joint, 1] = True
+    return fit(motion, goal) if goal.asked.any() else motion
 
 
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
@@ -51,14 +57,3 @@ def _grounded(motion: Motion, places: np.ndarray) -> Motion:
     """Lowered by as much as the lowest joint is above the floor, a quarter of a second averaged."""
     drop = smooth(np.maximum(places[..., 1].min(axis=1), 0.0), odd(motion.fps / 4))
     return clean_feet(replace(motion, root=motion.root - drop[:, None] * np.array([0.0, 1.0, 0.0])))
-
-
-def _above_floor(motion: Motion) -> Motion:
-    """Hands and head brought up to the floor where they are under it."""
-    places = motion.positions()
-    goal = Goal.nothing(len(motion))
-    for joint, rest in REST.items():
-        sunk = places[:, joint, 1] < rest - SUNK
-        goal.positions[sunk, joint, 1] = rest
-        goal.asked[sunk, joint, 1] = True
-    return fit(motion, goal) if goal.asked.any() else motion

@@ -95,16 +95,12 @@ class WindowSampler:
             frames=frames,
             sampling=replace(self.sampling, temperature=min(self.sampling.temperature * livelier, 2.0)),
         )
-        made = made + _lift(person, made, self.predictor.fps)[..., None, None] * [0, 1, 0]
+        lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
+        under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
+        ease = max(round(EASE * self.predictor.fps), 1)
+        lift = envelope(under, ease // 2) * smoothstep(np.arange(1, made.shape[1] + 1) / (2 * ease))
+        made = made + lift[..., None, None] * [0, 1, 0]
         return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
-
-
-def _lift(person: Array, made: Array, fps: float) -> Array:
-    """(rows, frames) metres that keep what is sampled behind a person from sinking under the floor at y = 0."""
-    lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
-    under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
-    ease = max(round(EASE * fps), 1)
-    return envelope(under, ease // 2) * smoothstep(np.arange(1, made.shape[1] + 1) / (2 * ease))
 
 
 def windows_for(predictor: Predictor, seconds: float) -> int:

@@ -24,7 +24,6 @@ from motionloom.runtime.prior_condition import Bound, Floats
 from motionloom.runtime.sizes import NetConfig
 from motionloom.weights.container import ADAPTERS, check, halved
 
-KEY = ADAPTERS.key
 MAX_RANK = 512
 CHANGED = ("embed", "out", "project", "query", "heard", "linear1", "linear2", "change")
 """Last names of the layers that an adapter changes."""
@@ -118,11 +117,6 @@ _TEXTS = ("name", "control", "base", "fingerprint", "licence", "data")
 def adapters() -> dict[str, Path]:
     """Names and places of the adapters inside the package, for the prior ``default``."""
     return ADAPTERS.shipped()
-
-
-def is_adapter(path: Path) -> bool:
-    """True for a file of `Adapter.save`, damaged or not, by what its head says."""
-    return ADAPTERS.signed(path)
 
 
 def read_adapter(path: Path) -> Adapter:

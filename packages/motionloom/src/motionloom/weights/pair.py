@@ -21,7 +21,6 @@ from motionloom.runtime.text.known import Known, pack_known, unpack_known
 from motionloom.weights.adapter import origin
 from motionloom.weights.container import PAIRS, check, check_graphs, finite, graph_tensors, halved, split_graphs
 
-KEY = PAIRS.key
 UNKNOWN = "unknown: ask whoever gave you this file"
 _TEXTS = ("name", "base", "fingerprint", "licence", "data")
 
@@ -104,11 +103,6 @@ class PairBlock:
 def blocks() -> dict[str, Path]:
     """Names and places of the two-person blocks inside the package, for the prior ``default``."""
     return PAIRS.shipped()
-
-
-def is_block(path: Path) -> bool:
-    """True for a file of `PairBlock.save`, damaged or not, by what its head says."""
-    return PAIRS.signed(path)
 
 
 def read_block(path: Path) -> PairBlock:

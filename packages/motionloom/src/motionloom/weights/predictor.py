@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from motionloom.diffusion import SCHEDULES, Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
+from motionloom.diffusion import Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import Layout
 from motionloom.runtime.predictor import PredictorConfig, PredictorSession
@@ -32,7 +32,7 @@ from motionloom.weights.container import (
     halved,
     split_graphs,
 )
-from motionloom.weights.prior import NET, Card
+from motionloom.weights.prior import NET, Card, parse_schedule
 
 Array = np.ndarray
 
@@ -156,18 +156,13 @@ def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True)
     return PREDICTORS.write(path, tensors, about)
 
 
-def is_predictor(path: Path) -> bool:
-    """True for a file of `save_predictor`, damaged or not, by what its head says."""
-    return PREDICTORS.signed(path)
-
-
 def load_predictor(path: Path) -> Predictor:
     """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     about, tensors = PREDICTORS.read(path)
     with PREDICTORS.parsing(path):
         config, layout = PredictorConfig.parse(about["net"]), Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
-        schedule, card = _schedule(about["schedule"]), _card(about["card"])
+        schedule, card = parse_schedule(about["schedule"]), Card.parse(about["card"])
         fps, observed, variant = float(about["fps"]), about["observed"], _variant(about)
         condition = {"masked": condition_shape(layout, config.kept), "published": None}
         if not (math.isfinite(fps) and 1 <= fps <= 1000 and type(observed) is int and 2 <= observed < basis.frames):
@@ -190,22 +185,6 @@ def load_predictor(path: Path) -> Predictor:
         *_statistics(path, tensors, config),
         card,
     )
-
-
-def _schedule(about: dict[str, Any]) -> Schedule:
-    name, levels = about["name"], about["steps"]
-    if name not in SCHEDULES or type(levels) is not int or not 1 <= levels <= 100_000:
-        raise ValueError(f"a schedule {name!r} of {levels!r} levels")
-    return SCHEDULES[name](levels)
-
-
-def _card(about: dict[str, Any]) -> Card:
-    card = Card(**about)
-    if not all(isinstance(text, str) for text in (card.name, card.licence, card.data)):
-        raise ValueError("a card whose entries are no text")
-    if not isinstance(card.notes, dict):
-        raise ValueError("a card without notes")
-    return card
 
 
 def _statistics(path: Path, tensors: dict[str, Array], config: PredictorConfig) -> tuple[Array, Array, Array]:

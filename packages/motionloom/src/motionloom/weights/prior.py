@@ -56,6 +56,22 @@ class Card:
     notes: dict[str, Any] = field(default_factory=dict)
     """How they were made: steps, seed, recipe, measured numbers."""
 
+    @staticmethod
+    def parse(about: dict[str, Any]) -> "Card":
+        """From a file's description; raises TypeError or ValueError for what is none."""
+        card = Card(**about)
+        if not (isinstance(card.notes, dict) and all(isinstance(t, str) for t in (card.name, card.licence, card.data))):
+            raise ValueError("a card whose entries are of the wrong kind")
+        return card
+
+
+def parse_schedule(about: dict[str, Any]) -> Schedule:
+    """From a file's description; raises ValueError or KeyError for what is none."""
+    name, levels = about["name"], about["steps"]
+    if name not in SCHEDULES or type(levels) is not int or not 1 <= levels <= 100_000:
+        raise ValueError(f"a schedule {name!r} of {levels!r} levels")
+    return SCHEDULES[name](levels)
+
 
 @dataclass(frozen=True, eq=False)
 class Prior:
@@ -177,7 +193,7 @@ def read_card(path: Path) -> Card:
     try:
         check_head(path, max_bytes=PRIORS.max_bytes)
         with safe_open(path, framework="np") as file:
-            return Card(**_about(path, PRIORS.describe(path, dict(file.metadata() or {})))["card"])
+            return _about(path, PRIORS.describe(path, dict(file.metadata() or {})))["card"]
     except (SafetensorError, OSError, ValueError) as error:
         if isinstance(error, MotionloomError):
             raise
@@ -197,17 +213,16 @@ def load_prior(path: Path, device: str = "cpu") -> Prior:
         usable = values.shape == (config.features,) and np.isfinite(values).all()
         if not usable or (name == "std" and values.min() < 0):
             raise MotionloomError(f"{path} lacks a usable {name} of {config.features} numbers; fetch the weights again")
-    schedule = SCHEDULES[about["schedule"]["name"]](about["schedule"]["steps"])
     check_graphs(path, graphs, GRAPHS if about["text"] != "minilm" else (*GRAPHS, "text"))
     net = PriorSession(config, weights, {name: graphs[name] for name in GRAPHS}, device)
     net.check()
     prior = Prior(
         net,
-        schedule,
+        about["schedule"],
         tensors["mean"].astype(np.float32),
         tensors["std"].astype(np.float32),
         _text(path, about["text"], tensors, graphs),
-        Card(**about["card"]),
+        about["card"],
         float(about["fps"]),
         _known(path, about.get("known"), tensors, config.text),
     )
@@ -219,19 +234,13 @@ def load_prior(path: Path, device: str = "cpu") -> Prior:
 
 
 def _about(path: Path, about: dict[str, Any]) -> dict[str, Any]:
-    """A description with every value of the right kind."""
+    """A description with every value of the right kind, the card and the schedule among them as such."""
     with PRIORS.parsing(path):
-        steps = about["schedule"]["steps"]
-        known = about["schedule"]["name"] in SCHEDULES and type(steps) is int and 1 <= steps <= 100_000
-        kinds = {"name": str, "licence": str, "data": str, "notes": dict}
-        card = about["card"]
-        good_card = "name" in card and all(isinstance(card.get(k, kind()), kind) for k, kind in kinds.items())
         good_rate = type(about["fps"]) in (int, float) and math.isfinite(about["fps"]) and 1 <= about["fps"] <= 1000
-        if not (
-            known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)
-        ):
+        if not (good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)):
             raise ValueError("values of the wrong kind")
-        return {**about, "card": {k: card[k] for k in kinds if k in card}}
+        card = Card.parse({key: value for key, value in about["card"].items() if key in Card.__annotations__})
+        return about | {"card": card, "schedule": parse_schedule(about["schedule"])}
 
 
 def _text(path: Path, name: str, tensors: dict[str, Array], graphs: dict[str, bytes]) -> TextEncoder:

@@ -11,7 +11,6 @@ from motionloom_train.nets.text.hub import Pretrained, PretrainedText, open_pret
 
 HUB_NAME = "openai/clip-vit-base-patch32"
 HUMANML_LENGTH = 22  # 20 word pieces, start and end: what the HumanML3D and KIT models saw
-FULL_LENGTH = 77  # what the BABEL models saw
 
 
 class ClipText(PretrainedText):
