@@ -12,6 +12,8 @@ import {
   setPeople,
   splitSegment,
 } from "../project/timeline";
+import { newLook, newTrack, writeTrack } from "../panels/tracks";
+import { removeTrack } from "../project/tracks";
 import type { Stage } from "../stage/stage";
 import { type App, duration } from "./app";
 import { type Clipboard, copied, kept } from "./clipboard";
@@ -34,6 +36,9 @@ export interface Action {
   /** Whether it can be done at the moment, where that is not always so. */
   readonly isThere?: () => boolean;
 }
+
+/** Poses that are put between two. */
+export const FILLED = 3;
 
 export type Actions = Readonly<Record<string, Action>>;
 
@@ -146,7 +151,17 @@ function blocks({ app, editWords }: Parts): Actions {
         editWords(project.value.segments.at(-1)!.id);
       },
     },
-    write: { group, label: "Write in the block", keys: ["Enter"], run: () => editWords(chosen()[0]!) },
+    write: {
+      group,
+      label: "Write in the block",
+      keys: ["Enter"],
+      run: () => {
+        const { selection } = session.value;
+        if (selection.kind === "track") writeTrack(app, selection.id);
+        else editWords(chosen()[0]!);
+      },
+    },
+    track: { group, label: "Arms or legs do something of their own", keys: ["Shift+A"], run: () => newTrack(app) },
     previous: { group, label: "Block before", keys: ["ArrowUp"], run: () => step(-1) },
     next: { group, label: "Block behind", keys: ["ArrowDown"], run: () => step(1) },
     morePrevious: { group, label: "Select the block before, too", keys: ["Shift+ArrowUp"], run: () => step(-1, true) },
@@ -210,6 +225,12 @@ function timeline({ app, zoom, fit }: Parts): Actions {
   const stop = (by: 1 | -1) =>
     session.update({ time: clamp(nextStop(project.value, session.value.time, by), 0, duration(app)), playing: false });
   return {
+    curves: {
+      group,
+      label: "Curves: how high and fast a joint is",
+      keys: ["Shift+C"],
+      run: () => session.update({ curves: !session.value.curves }),
+    },
     fit: { group, label: "Show the whole timeline", keys: ["F"], run: fit },
     zoomIn: { group, label: "Zoom in", keys: ["+", "="], run: () => zoom(1.4) },
     zoomOut: { group, label: "Zoom out", keys: ["-"], run: () => zoom(1 / 1.4) },
@@ -250,6 +271,8 @@ function removeSelected({ project, session }: App): void {
   if (selection.kind === "marker") project.change("delete a marker", (old) => removeMarker(old, selection.id));
   if (selection.kind === "target") project.change("delete a target", (old) => removeTarget(old, person, selection.id));
   if (selection.kind === "pose") project.change("delete a pose", (old) => removePose(old, person, selection.id));
+  if (selection.kind === "track")
+    project.change("delete words of a part", (old) => removeTrack(old, person, selection.id));
   if (selection.kind === "point") project.change("delete a point", (old) => removePoint(old, person, selection.index));
 }
 
@@ -268,6 +291,17 @@ function stage({ app, deeds, live, stage }: Parts): Actions {
     path: { group, label: "Draw a path", keys: ["P"], run: tool("path") },
     target: { group, label: "Drag joints", keys: ["T"], run: tool("target") },
     pose: { group, label: "Keyframe the pose at hand", keys: ["O"], run: () => deeds.keyframe() },
+    look: { group, label: "Look at a point, or at the other person", keys: ["Shift+L"], run: () => newLook(app) },
+    copyPose: { group, label: "Copy the pose", keys: ["Alt+C"], run: () => deeds.copyPose() },
+    pastePose: { group, label: "Paste the pose at the playhead", keys: ["Alt+V"], run: () => deeds.pastePose() },
+    mirrorPose: { group, label: "Mirror the pose", keys: ["Alt+M"], run: () => deeds.mirrorPose() },
+    fillPoses: {
+      group,
+      label: "Poses between the selected one and the next",
+      keys: ["Alt+I"],
+      run: () => deeds.fillPoses(FILLED),
+    },
+    pin: { group, label: "Pin the joint of a pose, or let it go", keys: ["Alt+P"], run: () => stage.targets.pin() },
     live: { group, label: "Live: steer somebody who moves", keys: ["J"], run: () => live.toggle() },
     follow: { group, label: "Follow with the camera", keys: ["C"], run: flip("follow") },
     above: { group, label: "Look from above", keys: ["X"], run: () => stage.fromAbove() },

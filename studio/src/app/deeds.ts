@@ -1,11 +1,13 @@
 /** What one does with motions besides asking for them: continue, loop, switch, put aside, take a pose. */
 
-import { POSE, jointAt, places, poseAt } from "../body/clip";
-import { movedTo, putPose } from "../project/asks";
+import { mirrored, turnedTo } from "../body/posed";
+import { POSE, facingAt, jointAt, places, poseAt } from "../body/clip";
+import { changePose, fillPoses, movedTo, neighbours, poseNear, putPose } from "../project/asks";
 import {
   type Clip,
   type Project,
   type Take,
+  type Vec3,
   begins,
   clamp,
   keptTake,
@@ -170,9 +172,61 @@ export class Deeds {
     if (!clip) return this.say("There is no pose yet; draw a motion first.");
     const { time, person } = this.app.session.value;
     const positions = places(poseAt(clip, person, time, new Float32Array(POSE)));
-    this.app.project.change("keyframe a pose", (old) =>
-      putPose(old, person, "pose at hand", clamp(toFrame(time), 0, length(old)), positions),
+    this.putPose("pose at hand", positions, "keyframe a pose");
+  }
+
+  /** The pose that is selected or, where none is, the one at the playhead. */
+  poseAtHand(): readonly Vec3[] | null {
+    const { selection, time, person } = this.app.session.value;
+    const own = this.app.project.value.people[person]?.poses.find(
+      (one) => selection.kind === "pose" && one.id === selection.id,
     );
+    const clip = shownClip(this.app);
+    return own?.positions ?? (clip && places(poseAt(clip, person, time, new Float32Array(POSE))));
+  }
+
+  copyPose(): void {
+    const pose = this.poseAtHand();
+    if (!pose) return this.say("There is no pose yet; draw a motion first.");
+    this.app.session.update({ pose, told: "The pose is copied; Alt V keyframes it at the playhead." });
+  }
+
+  /** Ask for the copied pose at the playhead, where the person is then and as they face. */
+  pastePose(): void {
+    const { pose, time, person } = this.app.session.value;
+    const clip = shownClip(this.app);
+    if (!pose) return this.say("No pose is copied yet; copy one with Alt C.");
+    const [x, , z] = clip ? jointAt(clip, person, 0, time) : pose[0]!;
+    const positions = clip ? turnedTo(pose, [x, z], facingAt(clip, person, time)) : pose;
+    this.putPose("pasted pose", positions, "paste a pose");
+  }
+
+  /** Exchange left and right of the selected pose, or ask for the one at the playhead so. */
+  mirrorPose(): void {
+    const { selection, person } = this.app.session.value;
+    const pose = this.poseAtHand();
+    if (!pose) return this.say("There is no pose yet; draw a motion first.");
+    const positions = mirrored(pose);
+    if (selection.kind !== "pose") return this.putPose("mirrored pose", positions, "mirror a pose");
+    this.app.project.change("mirror a pose", (old) => changePose(old, person, selection.id, { positions }));
+  }
+
+  /** Poses between the selected one and the next. */
+  fillPoses(count: number): void {
+    const { selection, person } = this.app.session.value;
+    const [, next] = selection.kind === "pose" ? neighbours(this.app.project.value, person, selection.id) : [];
+    if (selection.kind !== "pose" || !next)
+      return this.say("Select a pose behind which there is another one; poses are put between the two.");
+    this.app.project.change("poses in between", (old) => fillPoses(old, person, selection.id, count));
+  }
+
+  /** Ask for a pose at the playhead, and select it. */
+  private putPose(name: string, positions: readonly Vec3[], label: string): void {
+    const { person } = this.app.session.value;
+    const time = clamp(toFrame(this.app.session.value.time), 0, length(this.app.project.value));
+    this.app.project.change(label, (old) => putPose(old, person, name, time, positions));
+    const put = poseNear(this.app.project.value, person, time);
+    if (put) this.app.session.update({ selection: { kind: "pose", id: put.id }, time: put.time, playing: false });
   }
 
   /** Ask for a pose of another clip, where the person is at the playhead. */
@@ -182,9 +236,7 @@ export class Deeds {
     const positions = places(poseAt(other, 0, at, new Float32Array(POSE)));
     const shown = shownClip(this.app);
     const [x, , z] = shown ? jointAt(shown, person, 0, time) : [0, 0, 0];
-    this.app.project.change("keyframe a pose", (old) =>
-      putPose(old, person, clip.name, clamp(toFrame(time), 0, length(old)), movedTo(positions, { x, z })),
-    );
+    this.putPose(clip.name, movedTo(positions, { x, z }), "keyframe a pose");
   }
 
   /** What was done live becomes the motion; each stretch of the same words is a block. */

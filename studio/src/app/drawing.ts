@@ -4,6 +4,7 @@ import { keepWay, needsWay } from "../project/asks";
 import { overlaid } from "../body/clip";
 import { CHANGED, FPS, type Project, keptTake, length } from "../project/model";
 import { type Job, type Plan, isDrawn, plan, planKey } from "../project/plan";
+import { trackKeys } from "../project/tracks";
 import { type Result, motion, takeOf } from "../server/api";
 import type { JobRequest } from "../server/types";
 import { Refused } from "../server/http";
@@ -30,7 +31,15 @@ export const MARKS = { asked: "draw-asked", preview: "draw-preview", full: "draw
 
 /** The motion whose blocks stay where they ask for the same; null: none, or there are to be several. */
 function keptFrom(project: Project): string | null {
-  return project.count === 1 && !project.base ? (keptTake(project)?.motion ?? null) : null;
+  return project.count === 1 && !project.base ? (keptTake(project)?.under ?? keptTake(project)?.motion ?? null) : null;
+}
+
+/** Where nothing is drawn over what is frozen, that is the take. */
+function asFrozen(project: Project): Project {
+  const { base } = project;
+  return base && keptTake(project)?.motion !== base.motion
+    ? { ...project, takes: [base], kept: 0, drawn: "[]" }
+    : project;
 }
 
 export class Drawer {
@@ -59,6 +68,7 @@ export class Drawer {
     const key = planKey(value);
     if (key === value.drawn || !jobs.length) {
       this.stop();
+      if (!missing && value.base && key !== value.drawn) this.app.project.amend(asFrozen);
       this.app.session.update({ error: missing, pending: false });
       return;
     }
@@ -159,8 +169,8 @@ export class Drawer {
   private async chain(jobs: readonly Job[], running: AbortController, old: string | null): Promise<readonly Result[]> {
     let results: readonly Result[] = [];
     for (const job of jobs) {
-      const request = job.task === "edit" ? { ...job, motion: job.motion ?? results[0]!.id } : job;
-      if (job.task !== "compose" || !old) results = await this.run(request, running, job.count);
+      if (job.task === "edit" && !job.motion) results = await this.edited(job, results, running);
+      else if (job.task !== "compose" || !old) results = await this.run(job as JobRequest, running, job.count);
       else
         results = await this.run({ ...job, kept_from: old }, running, job.count).catch((error: unknown) => {
           if (!(error instanceof Refused) || error.status !== 404) throw error;
@@ -170,9 +180,37 @@ export class Drawer {
     return results;
   }
 
+  /** Every motion changed by an edit; what was remarked on it stays. */
+  private async edited(job: Job, before: readonly Result[], running: AbortController): Promise<readonly Result[]> {
+    const found: Result[] = [];
+    for (const [row, old] of before.entries()) {
+      const request = { ...job, motion: old.id, seed: (job.seed ?? 0) + row } as JobRequest;
+      const made = await this.run(request, running, before.length > 1 ? before.length : job.count, row);
+      found.push(
+        ...made.map((one) => ({
+          ...one,
+          under: old.under ?? old.id,
+          measures: { ...old.measures, ...one.measures },
+          remarks: [...new Set([...(old.remarks ?? []), ...(one.remarks ?? [])])],
+          notes: [...(old.notes ?? []), ...(one.notes ?? [])],
+        })),
+      );
+    }
+    return found;
+  }
+
   private async keep(project: Project, key: string, results: readonly Result[], signal: AbortSignal): Promise<void> {
-    const how = (result: Result) => (project.base ? "redrawn" : result.measures?.redrawn ? CHANGED : "drawn");
-    const takes = results.map((result) => takeOf(result, how(result)));
+    const how = ({ measures }: Result) => {
+      if (project.base) return "redrawn";
+      if (!measures?.redrawn) return "drawn";
+      return measures.redrawn.length ? CHANGED : (keptTake(project)?.how ?? CHANGED);
+    };
+    const tracks = trackKeys(project);
+    const takes = results.map((result) => ({
+      ...takeOf(result, how(result)),
+      ...(tracks.length ? { tracks } : {}),
+      ...(result.under && !project.base ? { under: result.under } : {}),
+    }));
     const clips = await Promise.all(takes.map((take) => motion(take.motion)));
     signal.throwIfAborted();
     this.app.denoising.value = [];
@@ -185,8 +223,8 @@ export class Drawer {
     if (value.takes === takes || value.drawn !== key) this.app.session.update({ clips });
   }
 
-  /** Run one job and show how it comes along: the first `takes` of its motions. */
-  private run(job: JobRequest, running: AbortController, takes = 1): Promise<readonly Result[]> {
+  /** Run one job and show how it comes along: its motions are the takes from the `first` on, of so many. */
+  private run(job: JobRequest, running: AbortController, takes = 1, first = 0): Promise<readonly Result[]> {
     const isCurrent = () => this.running === running && !running.signal.aborted;
     // The first motion is seen as it comes out of the noise; a later one would hide the motion that is there.
     const levels = this.app.session.value.clips.length ? SHOWN_EVERY : true;
@@ -197,7 +235,10 @@ export class Drawer {
         told = performance.now();
         this.app.session.update({ drawing: { done, of } });
       },
-      level: (level) => isCurrent() && level.row < takes && this.show(job, level, takes),
+      level: (level) => {
+        const row = level.row + first;
+        if (isCurrent() && row < takes) this.show(job, { ...level, row }, takes);
+      },
     });
   }
 

@@ -3,6 +3,7 @@
 import { SUFFIX, checked, read, written } from "../project/file";
 import { asked, timelineOf } from "../project/goals";
 import { CHANGED, type Project, type Stamp, keptTake } from "../project/model";
+import { trackCommands } from "../project/tracks";
 import { opened } from "../project/opened";
 import {
   type Format,
@@ -27,6 +28,9 @@ const GLB_MAGIC = 0x46546c67;
 /** Said in the file of a timeline whose blocks were changed one at a time. */
 const ANEW =
   "# Blocks were changed one at a time, and the others kept; the command draws all of them, as 'Draw all blocks' does.\n";
+
+/** The same of parts that do something else than the blocks. */
+const PARTS = "# What single parts of the body do is laid over it, where it is written as NPZ, by:\n";
 
 export class Files {
   /** The skeleton that came last, for AMC files. */
@@ -74,9 +78,15 @@ export class Files {
     if (project.base)
       throw new Error("frozen stretches are not in a timeline file; unfreeze them, or export the motion itself.");
     if (project.reactTo) throw new Error("an answer to a clip is not in a timeline file; export the motion itself.");
+    const parts = trackCommands(project, name);
     const yaml = await timelineYaml(timelineOf(project, keptTake(project)?.seed ?? project.seed));
     const isChanged = keptTake(project)?.how === CHANGED;
-    const head = `# motionloom ${command(project, `${name}.yaml`)}\n${isChanged ? ANEW : ""}`;
+    const head = [
+      `# motionloom ${command(project, `${name}.yaml`)}\n`,
+      isChanged ? ANEW : "",
+      parts.length ? PARTS : "",
+      ...parts.map((one) => `# motionloom ${one}\n`),
+    ].join("");
     download(new Blob([head, yaml]), `${name}.yaml`);
   }
 

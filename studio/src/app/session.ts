@@ -14,6 +14,7 @@ export type Selection =
   | { readonly kind: "marker"; readonly id: string }
   | { readonly kind: "target"; readonly id: string }
   | { readonly kind: "pose"; readonly id: string }
+  | { readonly kind: "track"; readonly id: string }
   | { readonly kind: "point"; readonly index: number };
 
 /** The ids of all blocks that are selected. */
@@ -58,6 +59,11 @@ export interface Session {
   /** Whose path, targets and poses are edited: 0 or 1. */
   readonly person: number;
   readonly joint: number;
+  /** Joints of a pose that move with that one, and those that stay. */
+  readonly joints: readonly number[];
+  readonly pins: readonly number[];
+  /** A pose that was copied. */
+  readonly pose: readonly Vec3[] | null;
   readonly selection: Selection;
   /** A stretch that is marked on the ruler. */
   readonly range: Range | null;
@@ -66,6 +72,8 @@ export interface Session {
   /** Whether ghosts show the motion a little before and behind the playhead. */
   readonly around: boolean;
   readonly trails: boolean;
+  /** Whether the timeline shows how high and how fast the joint is. */
+  readonly curves: boolean;
   readonly sideBySide: boolean;
   readonly snapping: boolean;
   /** Whether a block that is moved lies over others, which stay when they are, or pushes them aside. */
@@ -111,12 +119,16 @@ export function newSession(): Signal<Session> {
     tool: "select",
     person: 0,
     joint: 21,
+    joints: [],
+    pins: [],
+    pose: null,
     selection: NOTHING,
     range: null,
     follow: true,
     ghosts: true,
     around: false,
     trails: false,
+    curves: false,
     sideBySide: false,
     snapping: true,
     overwriting: false,

@@ -31,11 +31,11 @@ export interface Reached {
   readonly moved: number;
 }
 
-/** The pose with `joint` at `target`. */
-export function reach(pose: Float32Array, joint: number, target: Vec3): Reached {
+/** The pose with `joint` at `target`; with `stays`, only as near to it as the limb goes, since the body stays. */
+export function reach(pose: Float32Array, joint: number, target: Vec3, stays = false): Reached {
   const result = Float32Array.from(pose);
   const chain = CHAINS[joint] ?? [joint];
-  const missing = missingLength(result, chain, target);
+  const missing = stays ? 0 : missingLength(result, chain, target);
   if (missing > 0) shift(result, towards(vec(result, chain[0]!), target, missing));
   if (chain.length > 1) fabrik(result, chain, target);
   else shift(result, minus(target, vec(result, joint)));

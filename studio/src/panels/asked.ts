@@ -2,6 +2,7 @@
 
 import type { Actions } from "../app/actions";
 import { type App, shownClip } from "../app/app";
+import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
 import { NOTHING } from "../app/session";
 import { jointName } from "../body/skeleton";
@@ -13,16 +14,25 @@ import { miss, numberField, section, textButton, wrong } from "./parts";
 
 /** Centimetres beyond which a path counts as missed. */
 const OFF_PATH = 15;
+/** Poses that are put between two at most. */
+const MOST_FILLED = 20;
 /** Centimetres that feet leave the floor by in a step. */
 const STEP = 12;
 
-export function askedPanels(app: App, project: Project, person: Person, who: number, actions: Actions): HTMLElement[] {
+export function askedPanels(
+  app: App,
+  project: Project,
+  person: Person,
+  who: number,
+  actions: Actions,
+  deeds: Deeds,
+): HTMLElement[] {
   const { tool } = app.session.value;
   const panels = [];
   if (person.path || tool === "path") panels.push(pathPanel(app, project, person, who));
   if (tool === "target") panels.unshift(targetPanel(app, project, person, who));
   else if (person.targets.length) panels.push(targetPanel(app, project, person, who));
-  if (person.poses.length) panels.push(posePanel(app, project, person, who, actions));
+  if (person.poses.length) panels.push(posePanel(app, project, person, who, actions, deeds));
   if (project.base && panels.length)
     panels.push(
       h(
@@ -199,8 +209,18 @@ function flight(centimetres: number): HTMLElement | false {
   return h("span", { class: centimetres > FLYING ? "miss unmet" : "miss", title }, `↑ ${centimetres.toFixed(0)} cm`);
 }
 
-function posePanel(app: App, project: Project, person: Person, who: number, actions: Actions): HTMLElement {
+function posePanel(
+  app: App,
+  project: Project,
+  person: Person,
+  who: number,
+  actions: Actions,
+  deeds: Deeds,
+): HTMLElement {
   const clip = shownClip(app);
+  const { selection, tool } = app.session.value;
+  const chosen = selection.kind === "pose" && person.poses.find((one) => one.id === selection.id);
+  const hasNext = chosen && person.poses.some((one) => one.time > chosen.time);
   return section(
     "Poses",
     wrong(app, "pose"),
@@ -212,7 +232,7 @@ function posePanel(app: App, project: Project, person: Person, who: number, acti
         .map((one) =>
           h(
             "li",
-            { "data-key": one.id },
+            { "data-key": one.id, class: one === chosen ? "chosen" : "" },
             h(
               "button",
               {
@@ -230,7 +250,39 @@ function posePanel(app: App, project: Project, person: Person, who: number, acti
           ),
         ),
     ),
-    h("div", { class: "row" }, textButton("Keyframe this pose", actions.pose!.run, { title: "O" })),
+    chosen &&
+      h(
+        "p",
+        { class: "quiet" },
+        tool === "target"
+          ? "Drag its joints: Shift and click chooses several, which move together; Alt P pins what is to stay."
+          : "T, then drag its joints.",
+      ),
+    h(
+      "div",
+      { class: "row wrap" },
+      textButton("Keyframe this pose", actions.pose!.run, { title: "O" }),
+      textButton("Copy", actions.copyPose!.run, { title: "Copy the pose (Alt C)" }),
+      textButton("Paste", actions.pastePose!.run, { title: "Paste the pose at the playhead (Alt V)" }),
+      textButton("Mirror", actions.mirrorPose!.run, { title: "Exchange left and right (Alt M)" }),
+    ),
+    hasNext &&
+      h(
+        "div",
+        { class: "pair" },
+        numberField(
+          "Poses to the next one",
+          null,
+          "",
+          (count) => count !== null && deeds.fillPoses(Math.round(count)),
+          {
+            min: 1,
+            max: MOST_FILLED,
+            step: 1,
+            empty: "how many",
+          },
+        ),
+      ),
   );
 }
 

@@ -7,11 +7,13 @@ import { h, morph } from "../app/dom";
 import { measuredIn } from "../app/measured";
 import { type Given, type Project, type Segment, begins, length } from "../project/model";
 import { notesOf } from "../project/goals";
+import { trackOf } from "../project/tracks";
 import { changeSegment, longestTransition, resizeSegment, setPeople, setTransition } from "../project/timeline";
 import { clipsSection, fanSection, takesSection } from "./takes";
 import { askedPanels } from "./asked";
+import { trackSection } from "./tracks";
 import { markerSection } from "./markers";
-import { numberField, section, textButton, wrong } from "./parts";
+import { numberField, section, textButton, wordsArea, wrong } from "./parts";
 
 export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLElement): void {
   let measured: readonly string[] = [];
@@ -28,7 +30,7 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
     const { value } = app.project;
     const { fan, person } = app.session.value;
     const who = Math.min(person, value.people.length - 1);
-    const asked = askedPanels(app, value, value.people[who]!, who, actions);
+    const asked = askedPanels(app, value, value.people[who]!, who, actions, deeds);
     const isTool = app.session.value.tool !== "select";
     morph(
       root,
@@ -62,6 +64,8 @@ function words(app: App, project: Project, deeds: Deeds, measured: readonly stri
   const index = one ? project.segments.indexOf(one) : -1;
   const marker = selection.kind === "marker" && project.markers.find(({ id }) => id === selection.id);
   if (marker) return markerSection(app, marker, actions.remove!.run);
+  const track = selection.kind === "track" && trackOf(project, app.session.value.person, selection.id);
+  if (track) return trackSection(app, track, actions.remove!.run);
   if (!one) {
     return section(
       "Motion",
@@ -161,24 +165,8 @@ function kept(given: Given | null, drop: () => void): HTMLElement | null {
 
 function area(deeds: Deeds, one: Segment, second: boolean): HTMLElement {
   const label = second ? "What the second person does; empty: the same" : "What the person does";
-  return h(
-    "textarea",
-    {
-      class: "words",
-      rows: "2",
-      "aria-label": label,
-      placeholder: label,
-      "data-key": `${one.id}${second}`,
-      maxlength: "2000",
-      spellcheck: "true",
-      oninput: (event: Event) => deeds.write(one.id, (event.target as HTMLTextAreaElement).value, second),
-      onkeydown: (event: KeyboardEvent) => {
-        if (event.key !== "Escape" && (event.key !== "Enter" || event.shiftKey)) return;
-        event.preventDefault();
-        (event.target as HTMLElement).blur();
-      },
-    },
-    second ? one.other : one.text,
+  return wordsArea(label, `${one.id}${second}`, second ? one.other : one.text, (text) =>
+    deeds.write(one.id, text, second),
   );
 }
 

@@ -92,6 +92,29 @@ export function numberField(
   );
 }
 
+/** A place to write what somebody does; `Enter` and `Escape` leave it. */
+export function wordsArea(label: string, key: string, text: string, write: (text: string) => void): HTMLElement {
+  return h(
+    "textarea",
+    {
+      class: "words",
+      rows: "2",
+      "aria-label": label,
+      placeholder: label,
+      "data-key": key,
+      maxlength: "2000",
+      spellcheck: "true",
+      oninput: (event: Event) => write((event.target as HTMLTextAreaElement).value),
+      onkeydown: (event: KeyboardEvent) => {
+        if (event.key !== "Escape" && (event.key !== "Enter" || event.shiftKey)) return;
+        event.preventDefault();
+        (event.target as HTMLElement).blur();
+      },
+    },
+    text,
+  );
+}
+
 /** "Ctrl+Z" as somebody reads it. */
 export function shownKey(key: string): string {
   const names: Record<string, string> = {

@@ -32,7 +32,7 @@ const SPLITS: readonly Split[] = [
     label: "Height of the timeline",
     variable: "--timeline",
     isUpright: false,
-    usual: 268,
+    usual: 276,
     least: 150,
     most: () => innerHeight * 0.7,
   },

@@ -14,6 +14,7 @@ import {
   toFrame,
 } from "./model";
 import { type MotionClip, facingAt, jointAt } from "../body/clip";
+import { between } from "../body/posed";
 import { PELVIS } from "../body/skeleton";
 import { type Ground, pathPoint, simplified } from "./path";
 import { changePerson } from "./timeline";
@@ -151,6 +152,29 @@ export function putPose(
     ...person,
     poses: [...person.poses.filter((one) => Math.abs(one.time - time) >= 0.5 / FPS), pose],
   }));
+}
+
+/** The pose at a time, if there is one. */
+export function poseNear(project: Project, who: number, time: number): Pose | undefined {
+  return project.people[who]?.poses.find((one) => Math.abs(one.time - time) < 0.5 / FPS);
+}
+
+/** `count` poses evenly between one and the next in time. */
+export function fillPoses(project: Project, who: number, id: string, count: number): Project {
+  const [from, to] = neighbours(project, who, id);
+  if (!from || !to) return project;
+  return between(from.positions, to.positions, count).reduce((now, positions, index) => {
+    const time = toFrame(from.time + ((to.time - from.time) * (index + 1)) / (count + 1));
+    const isFree = time > from.time && time < to.time && !poseNear(now, who, time);
+    return isFree ? putPose(now, who, "in between", time, positions) : now;
+  }, project);
+}
+
+/** A pose and the next one in time. */
+export function neighbours(project: Project, who: number, id: string): (Pose | undefined)[] {
+  const poses = [...(project.people[who]?.poses ?? [])].sort((a, b) => a.time - b.time);
+  const index = poses.findIndex((one) => one.id === id);
+  return index < 0 ? [] : [poses[index], poses[index + 1]];
 }
 
 export function changePose(project: Project, who: number, id: string, part: Partial<Pose>): Project {

@@ -1,7 +1,19 @@
 /** A project as one file, and back. A file may come from anybody: it is checked before anything is made of it. */
 
 import { JOINTS } from "../body/skeleton";
-import { type Given, type Project, type Stamp, FPS, LONGEST, SHORTEST, VERSION, exampleProject } from "./model";
+import { isPart } from "./tracks";
+import {
+  type Given,
+  type Project,
+  type Stamp,
+  type Track,
+  FPS,
+  LONGEST,
+  SHORTEST,
+  OTHER,
+  VERSION,
+  exampleProject,
+} from "./model";
 
 export const SUFFIX = ".loom.json";
 const MOST_SEGMENTS = 500;
@@ -150,6 +162,22 @@ function person(found: unknown, name: string) {
         positions,
       };
     }),
+    tracks: list(asked.tracks ?? [], `${name}.tracks`, 200).map((one, index) => track(one, `${name}.tracks[${index}]`)),
+  };
+}
+
+function track(found: unknown, name: string): Track {
+  const one = mapping(found, name);
+  const part = word(one.part, `${name}.part`);
+  if (!isPart(part)) throw new ProjectError(`${name}.part is ${shown(part)}, which names no part of the body.`);
+  return {
+    id: word(one.id, `${name}.id`),
+    part,
+    text: word(one.text ?? "", `${name}.text`),
+    clip: one.clip ? clip(one.clip, `${name}.clip`) : null,
+    look: one.look === OTHER ? OTHER : one.look == null ? null : place(one.look, `${name}.look`),
+    from: number(one.from, `${name}.from`, 0, 3600),
+    until: number(one.until, `${name}.until`, 0, 3600),
   };
 }
 
@@ -167,6 +195,10 @@ function take(found: unknown, name: string) {
     ...(given.overlaps == null
       ? {}
       : { overlaps: list(given.overlaps, `${name}.overlaps`, 10_000).map((one) => overlap(one, `${name}.overlaps`)) }),
+    ...(given.tracks == null
+      ? {}
+      : { tracks: list(given.tracks, `${name}.tracks`, 400).map((one) => word(one, `${name}.tracks`)) }),
+    ...(given.under == null ? {} : { under: motionId(given.under, `${name}.under`) }),
     ...(given.notes == null
       ? {}
       : { notes: list(given.notes, `${name}.notes`, 200).map((one, index) => note(one, `${name}.notes[${index}]`)) }),

@@ -5,6 +5,8 @@
  * immutable: an edit gives a new project.
  */
 
+import type { Part } from "./tracks";
+
 export const FPS = 20;
 export const SHORTEST = 0.2;
 export const LONGEST = 60;
@@ -66,11 +68,28 @@ export interface Pose {
   readonly positions: readonly Vec3[];
 }
 
+export const OTHER = "other";
+
+/** A part of the body that does something of its own from one time to another. */
+export interface Track {
+  readonly id: string;
+  readonly part: Part;
+  /** What it does; empty: nothing of its own yet. */
+  readonly text: string;
+  /** A clip whose beginning it follows instead of words. */
+  readonly clip: Clip | null;
+  /** Where a head looks: a place, or the other person. */
+  readonly look: Vec3 | typeof OTHER | null;
+  readonly from: number;
+  readonly until: number;
+}
+
 /** What is asked of one person besides words. */
 export interface Person {
   readonly path: Path | null;
   readonly targets: readonly Target[];
   readonly poses: readonly Pose[];
+  readonly tracks: readonly Track[];
 }
 
 /** How a take was made whose blocks were drawn one after the other, as they changed. */
@@ -90,6 +109,9 @@ export interface Take {
   readonly notes?: readonly Note[];
   /** Where one body is in the other. */
   readonly overlaps?: readonly Overlap[];
+  /** The tracks that were laid over it (`trackKey`), and the motion under them. */
+  readonly tracks?: readonly string[];
+  readonly under?: string;
 }
 
 /** Seconds in which two bodies are in each other, and by how many metres at most. */
@@ -167,7 +189,7 @@ export function newId(): string {
   return `${Date.now().toString(36)}${counter.toString(36)}${Math.floor(Math.random() * 1296).toString(36)}`;
 }
 
-export const NOTHING_ASKED: Person = { path: null, targets: [], poses: [] };
+export const NOTHING_ASKED: Person = { path: null, targets: [], poses: [], tracks: [] };
 
 export function segment(text: string, seconds: number): Segment {
   return { id: newId(), text, other: "", seconds, transition: null, given: null };

@@ -80,7 +80,7 @@ function read(goal: unknown, seconds: number): { person: Person; kept?: unknown 
   const line = path && pathOf(path as unknown as Mapping);
   const own = joints.filter(isOwn);
   const foreign = joints.filter((one) => !isOwn(one));
-  const person = { path: line ?? null, ...asks(own, seconds) };
+  const person = { ...NOTHING_ASKED, path: line ?? null, ...asks(own, seconds) };
   const kept: Mapping = { ...others };
   if (path && !line) kept.path = path;
   if (foreign.length) kept.joints = foreign;

@@ -1,7 +1,8 @@
 /** Which jobs of the server make a project's motion. */
 
-import { type Project, type Range, begins, length } from "./model";
+import { type Project, type Range, type Take, begins, length } from "./model";
 import { STANDS, type TimelineJson, asked, goalOf, timelineOf } from "./goals";
+import { trackJobs } from "./tracks";
 import { needsWay } from "./asks";
 import type { Place, Problem } from "./places";
 import { between } from "./timeline";
@@ -15,7 +16,7 @@ type UnfinishedEdit = Omit<EditRequest, "motion"> & { motion?: string };
 export type Plan = { jobs: Job[]; missing: null } | { jobs: []; missing: Problem | null };
 
 export function plan(project: Project): Plan {
-  if (project.base) return redraw(project);
+  if (project.base) return redraw(project, project.base);
   if (project.segments.every((one) => !one.text.trim())) {
     const at: Place = { kind: "segment", id: project.segments[0]!.id };
     return { jobs: [], missing: { message: "No block has words yet; say what the person does.", at } };
@@ -26,9 +27,9 @@ export function plan(project: Project): Plan {
     return { jobs: [], missing: { message, at: { kind: "path", who } } };
   }
   const { seed, count } = project;
-  const timeline = timelineOf(project);
-  if (project.people.length === 1) return { jobs: [{ task: "compose", timeline, seed, count }], missing: null };
-  return { jobs: [duet(project)], missing: null };
+  const first: Job =
+    project.people.length > 1 ? duet(project) : { task: "compose", timeline: timelineOf(project), seed, count };
+  return { jobs: [first, ...trackJobs(project, length(project), null)], missing: null };
 }
 
 /** What a draw depends on: as long as it is the same, so is the motion. */
@@ -64,13 +65,13 @@ export function stale(project: Project): ReadonlySet<string> {
   return new Set(changed.map((one) => one.id));
 }
 
-/** The motion without its stretches that stay, each drawn from the words that are there. */
-function redraw(project: Project): Plan {
-  const { base, seed } = project;
-  if (!base) return { jobs: [], missing: null };
+/** The motion without its stretches that stay, each drawn from the words that are there, and the tracks over it. */
+function redraw(project: Project, base: Take): Plan {
+  const { seed, count } = project;
   const at = begins(project.segments);
   const jobs: UnfinishedEdit[] = [];
-  for (const [from, to] of between(project.frozen, Math.min(base.seconds, length(project)))) {
+  const free = between(project.frozen, Math.min(base.seconds, length(project)));
+  for (const [from, to] of free) {
     for (const person of redrawn(project)) {
       project.segments.forEach((one, index) => {
         const range: Range = [Math.max(from, at[index]!), Math.min(to, at[index + 1]!)];
@@ -80,10 +81,12 @@ function redraw(project: Project): Plan {
       });
     }
   }
-  const [first, last] = [jobs[0], jobs.at(-1)];
-  if (!first || !last) return { jobs: [], missing: null };
-  jobs[0] = { ...first, motion: base.motion };
-  jobs.push({ ...jobs.pop()!, count: project.count });
+  // As many takes as there are to be are made by the last redrawn stretch, or else by the first track.
+  const last = Math.max(jobs.length - 1, 0);
+  jobs.push(...trackJobs(project, base.seconds, free));
+  if (!jobs.length) return { jobs: [], missing: null };
+  jobs[0] = { ...jobs[0]!, motion: base.motion };
+  jobs[last] = { ...jobs[last]!, count };
   return { jobs, missing: null };
 }
 

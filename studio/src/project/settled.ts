@@ -1,11 +1,13 @@
 /** A motion that is there and stays, until somebody changes the words of a block. */
 
+import { trackKeys } from "./tracks";
 import { type Project, type Segment, type Take, NOTHING_ASKED, length, newId, round, segment, toFrame } from "./model";
 
 /** The project with a take that nothing draws again. */
 export function settled(project: Project, take: Take): Project {
   const frozen = [[0, Math.max(take.seconds, length(project))] as const];
-  return { ...project, base: take, only: null, takes: [take], kept: 0, frozen, drawn: "[]", count: 1 };
+  const kept = { ...take, tracks: trackKeys(project) };
+  return { ...project, base: kept, only: null, takes: [kept], kept: 0, frozen, drawn: "[]", count: 1 };
 }
 
 /** A motion of one person with blocks of its own; the last one is made as long as the motion is. */

@@ -20,6 +20,8 @@ export interface Result {
   readonly measures?: { readonly redrawn?: readonly number[]; readonly overlaps?: readonly Overlap[] };
   /** The remarks that are about some words. */
   readonly notes?: readonly Note[];
+  /** The motion that edits were laid over, one after the other. */
+  readonly under?: string;
 }
 
 type Happened = readonly ({ readonly sentence: string } | null)[];

@@ -116,6 +116,12 @@ export interface EditRequest {
   readonly strength?: number;
   /** whom to change, of several people in one motion, counted from 0 */
   readonly person?: number;
+  /** a clip whose beginning the parts that do not stay follow, instead of words */
+  readonly source?: string;
+  /** turn the head to this place: x, y, z, in metres */
+  readonly look?: readonly [number, number, number];
+  /** turn the head to this person's, counted from 0 */
+  readonly look_at?: number;
   /** the first motion's seed, the next have the next */
   readonly seed?: number;
   /** motions to make */

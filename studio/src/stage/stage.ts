@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { type App, denoised, duration, seenTakes, shownClip } from "../app/app";
 import { jointAt } from "../body/clip";
 import type { Ground } from "../project/path";
+import { GazeTool } from "./gazeTool";
 import { Cast, type Ghost } from "./cast";
 import { Character } from "./character";
 import { PathTool, ring } from "./pathTool";
@@ -19,6 +20,7 @@ const CLICKED = 5;
 const AROUND = [-0.6, -0.3, 0.3, 0.6];
 
 export class Stage {
+  private readonly gaze: GazeTool;
   readonly scene: Scene;
   readonly path: PathTool;
   readonly targets: TargetTool;
@@ -38,6 +40,7 @@ export class Stage {
     const theme = dark ? DARK : LIGHT;
     this.scene = new Scene(canvas, theme);
     this.cast = new Cast(this.scene.scene, theme);
+    this.gaze = new GazeTool(app, this.scene, theme);
     this.trails = new Trails(this.scene.scene, theme);
     this.character = new Character(app, this.scene);
     this.path = new PathTool(app, this.scene, theme);
@@ -49,6 +52,7 @@ export class Stage {
     this.scene.step = (elapsed) => this.step(elapsed);
     const said = new Said(app, this.scene);
     this.scene.painted = () => {
+      this.gaze.tell();
       this.path.tell();
       this.targets.tell();
       said.tell();
@@ -68,6 +72,7 @@ export class Stage {
     const theme: StageTheme = dark ? DARK : LIGHT;
     this.scene.look(theme);
     this.cast.look(theme);
+    this.gaze.look(theme);
     this.trails.look(theme);
     this.path.look(theme);
     this.targets.look(theme);
@@ -118,6 +123,7 @@ export class Stage {
       "tool",
       "person",
       "joint",
+      "joints",
       "selection",
       "ghosts",
       "around",
@@ -147,6 +153,7 @@ export class Stage {
     const dressed = this.character.at(time, !sideBySide && !isFuture && drawn === null && !this.app.live.value);
     this.cast.show(clip, time, dressed || isFuture);
     this.cast.showGhosts(this.ghosts(), time);
+    this.gaze.update();
     this.path.at(time);
     this.targets.update();
     this.scene.paint = this.app.session.value.sideBySide ? () => this.paintTakes() : null;

@@ -4,9 +4,11 @@ import { type App, duration } from "../app/app";
 import { NOTHING, blocksChosen, chosenBlocks } from "../app/session";
 import { changePose, changeTarget, shiftTarget } from "../project/asks";
 import { changeMarker } from "../project/markers";
-import { type Project, begins, clamp, length, newId, round } from "../project/model";
+import { type Project, SHORTEST, begins, clamp, length, newId, round } from "../project/model";
+import { writeTrack } from "../panels/tracks";
 import { halfSeconds, snap } from "../project/snap";
 import { layOver, moveSeam, moveSegments, resizeSegment, setTransition, transitionOf } from "../project/timeline";
+import { changeTrack, shiftTrack, trackOf } from "../project/tracks";
 import type { TimelineView } from "./view";
 
 /** Pixels within which a time catches on a mark, and that a block is moved before it is being dragged. */
@@ -39,6 +41,8 @@ export function listen(app: App, view: TimelineView, root: HTMLElement): void {
   // Clicks go to whoever captured the pointer, not to the block under it.
   root.addEventListener("dblclick", (event) => {
     const block = document.elementFromPoint(event.clientX, event.clientY)?.closest<HTMLElement>(".block");
+    const track = document.elementFromPoint(event.clientX, event.clientY)?.closest<HTMLElement>(".own");
+    if (track) writeTrack(app, track.dataset.id!);
     if (block?.dataset.id) view.edit(block.dataset.id, block.dataset.drag === "second");
   });
   root.addEventListener(
@@ -93,10 +97,22 @@ function begin(app: App, view: TimelineView, handle: HTMLElement, event: Pointer
       );
     }
     case "pose": {
-      app.session.update({ selection: { kind: "pose", id } });
       const pose = app.project.value.people[who]?.poses.find((one) => one.id === id);
+      app.session.update({ selection: { kind: "pose", id }, time: pose?.time ?? 0, playing: false });
       return edits("move a pose", pose?.time ?? 0, (project, time) =>
         changePose(project, who, id, { time: clamp(time, 0, length(project)) }),
+      );
+    }
+    case "track":
+    case "track-from":
+    case "track-until": {
+      app.session.update({ selection: { kind: "track", id } });
+      const { from = 0, until = 0 } = trackOf(app.project.value, who, id) ?? {};
+      if (handle.dataset.drag === "track")
+        return edits("move words of a part", from, (project, time) => shiftTrack(project, who, id, time));
+      const [edge, name] = handle.dataset.drag === "track-from" ? [from, "from"] : [until, "until"];
+      return edits("stretch words of a part", edge, (project, time) =>
+        changeTrack(project, who, id, name === "from" ? { from: Math.min(time, until - SHORTEST) } : { until: time }),
       );
     }
     case "marker": {
@@ -123,6 +139,7 @@ function marks(app: App): number[] {
   const asked = value.people.flatMap((person) => [
     ...person.targets.map((one) => one.time),
     ...person.poses.map((one) => one.time),
+    ...person.tracks.flatMap((one) => [one.from, one.until]),
   ]);
   const marked = value.markers.map((one) => one.time);
   return [...halfSeconds(duration(app) + 2), ...begins(value.segments), time, ...asked, ...marked];

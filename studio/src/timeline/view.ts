@@ -12,7 +12,10 @@ import { type Person, type Project, begins, keptTake, length, round } from "../p
 import { timed } from "../project/path";
 import type { Place } from "../project/places";
 import { transitionOf } from "../project/timeline";
+import { PARTS } from "../project/tracks";
+import { Curves } from "./curves";
 import { Figures } from "./figures";
+import { partsShown, trackRows } from "./tracks";
 
 export interface TimelineCalls {
   readonly write: (id: string, text: string, second: boolean) => void;
@@ -24,7 +27,13 @@ export interface TimelineCalls {
 const ROOM = 168;
 /** Pixels that are free beside a timeline that fits. */
 const FIT = 44;
-const LABELS = { words: "Words", other: "Words 2", path: "Path", joints: "Joints", poses: "Poses" } as const;
+const LABELS = {
+  words: "Words",
+  other: "Words 2",
+  path: "Path",
+  joints: "Joints",
+  poses: "Poses",
+} as const;
 
 /** What a press of the pointer does to a block's words, as far as that is true of this pointer. */
 const WRITE = matchMedia("(pointer: coarse)").matches ? "tap twice to write" : "double-click to write";
@@ -42,6 +51,7 @@ export class TimelineView {
   private readonly landing = h("div", { class: "landing", "aria-hidden": "true", hidden: true });
   private readonly band = h("div", { class: "band", "aria-hidden": "true", hidden: true });
   private readonly figures: Figures;
+  private readonly curves: Curves;
   private readonly playhead = h("div", { class: "playhead", "aria-hidden": "true" }, h("i"));
 
   constructor(
@@ -52,12 +62,14 @@ export class TimelineView {
     root.append(this.labels, this.scroll);
     tips(app, this.scroll);
     this.figures = new Figures(app, this.scroll, () => this.scale);
+    this.curves = new Curves(app);
     this.content.append(this.rows, this.figures.canvas, this.band, this.landing, this.playhead);
     app.project.subscribe(() => this.render());
     app.session.subscribe((now, before) => {
       if (now.time !== before.time) this.movePlayhead();
-      const keys = ["clips", "selection", "range", "person", "fan", "error"] as const;
-      if (keys.some((key) => now[key] !== before[key])) this.render();
+      const keys = ["clips", "selection", "range", "person", "fan", "error", "curves"] as const;
+      if (keys.some((key) => now[key] !== before[key]) || (now.curves && now.joint !== before.joint)) this.render();
+      if (now.curves && !before.curves) this.content.querySelector(".curves")?.scrollIntoView({ block: "nearest" });
       if (now.error !== before.error)
         this.content.querySelector(".said")?.scrollIntoView({ block: "nearest", inline: "nearest" });
     });
@@ -123,10 +135,25 @@ export class TimelineView {
       two &&
       h("i", { class: `asked who${name === "words" ? 0 : name === "other" ? 1 : this.app.session.value.person}` });
     const tracks = ["words", ...(two ? (["other"] as const) : []), "path", "joints", "poses"] as const;
-    morph(this.labels, [
-      h("span", { class: "ruler" }),
-      ...tracks.map((name) => h("span", { class: `track ${name}` }, who(name), this.label(name, two))),
-    ]);
+    morph(
+      this.labels,
+      [
+        h("span", { class: "ruler" }),
+        ...tracks.map((name) => h("span", { class: `track ${name}` }, who(name), this.label(name, two))),
+        ...partsShown(value, this.app.session.value.person).map((part) =>
+          h("span", { class: "track parts" }, who("poses"), part ? PARTS[part].name : "Parts"),
+        ),
+        this.app.session.value.curves &&
+          h(
+            "span",
+            { class: "track curves" },
+            h("i", { class: "height" }),
+            "Height",
+            h("i", { class: "speed" }),
+            "Speed",
+          ),
+      ].filter((one) => one !== false),
+    );
     const end = duration(this.app);
     this.content.style.width = `${end * this.scale + ROOM}px`;
     const rows = [
@@ -134,6 +161,7 @@ export class TimelineView {
       this.words(value, false),
       ...(two ? [this.words(value, true)] : []),
       ...this.asks(value),
+      ...this.curves.rows(this.scale),
     ];
     morph(this.rows, rows);
     this.figures.later();
@@ -148,6 +176,8 @@ export class TimelineView {
   private movePlayhead(): void {
     const x = this.app.session.value.time * this.scale;
     this.playhead.style.transform = `translateX(${x}px)`;
+    const said = this.app.session.value.curves && this.content.querySelector(".curves button");
+    if (said) said.textContent = this.curves.said();
     if (!this.app.session.value.playing) return;
     const { scrollLeft, clientWidth } = this.scroll;
     if (x < scrollLeft || x > scrollLeft + clientWidth - 40) this.scroll.scrollLeft = Math.max(x - 60, 0);
@@ -384,6 +414,7 @@ export class TimelineView {
       this.pathTrack(project, person, who),
       this.jointTrack(project, person, who),
       this.poseTrack(project, person, who),
+      ...trackRows(this.app, who, (from, until) => this.span(from, until)),
     ];
   }
 

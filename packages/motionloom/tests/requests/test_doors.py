@@ -19,7 +19,7 @@ READ_ELSEWHERE = {
     "generate": set(),
     "compose": {"count"},
     "control": set(),
-    "edit": {"person"},
+    "edit": {"person", "look_at"},
     "predict": {"person", "start", "end"},
     "switch": {"start", "end"},
     "duet": {"person"},
@@ -58,8 +58,9 @@ def test_the_server_describes_the_fields(task: str) -> None:
             continue
         assert spec.help in schema["description"]
         if spec.kind in ("number", "whole") and not spec.many:
-            assert schema.get("minimum", schema.get("exclusiveMinimum")) == spec.low
-            assert schema["maximum"] <= spec.high
+            bounds = schema["items"] if spec.size else schema
+            assert bounds.get("minimum", bounds.get("exclusiveMinimum")) == spec.low
+            assert bounds["maximum"] <= spec.high
 
 
 def test_the_page_has_the_types_that_the_server_says() -> None:

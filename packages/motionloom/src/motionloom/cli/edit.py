@@ -41,7 +41,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("clip", type=Path, metavar="CLIP")
     parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")
-    add_options(parser, Edit, "keep", "between", "extend", "strength", *SAMPLED, *FINISH)
+    add_options(parser, Edit, "keep", "between", "extend", "strength", "look", *SAMPLED, *FINISH)
+    parser.add_argument(
+        "--source", type=Path, metavar="CLIP", help="a clip that the parts that do not stay follow, instead of words"
+    )
     add_one_file(parser)
     add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's", own_unit="the clip's")
     add_reading(parser)
@@ -77,9 +80,10 @@ def run_edit(arguments: argparse.Namespace) -> int:
     )
     keep = [name.strip() for part in arguments.keep for name in part.split(",")]
     values = request_of(arguments, Edit, {"motion": clip, "prompt": arguments.text, "keep": keep})
+    source = None if arguments.source is None else read_clip(arguments, arguments.source)[0]
     clip = crop(clip, arguments)
     people = (to_smpl22(clip) if uniform else clip,)
-    plan = Plan(task="edit", values=values, sampling=values.sampling, people=people)
+    plan = Plan(task="edit", values=values, sampling=values.sampling, people=people, target=source)
     versions = results("editing", plan, Models(prior))
     interrupted = made.take((list(one.people) for one in versions), told=arguments.json)
     about = {

@@ -84,7 +84,7 @@ def _metavar(spec: Spec) -> str | tuple[str, ...]:
         return f"{{{','.join(spec.words)}}}"
     number = {"seconds": "S", RATE: "N"}.get(spec.unit, "X")
     one = {"whole": "N", "number": number}.get(spec.kind, "WORD")
-    return ("FROM", "TO") if spec.size else one
+    return {0: one, 2: ("FROM", "TO")}.get(spec.size, tuple("XYZ"))
 
 
 def _shown(value: Any) -> str:

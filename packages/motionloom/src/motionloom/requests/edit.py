@@ -25,4 +25,9 @@ class Edit(Finish, Adapted):
     extend: float = declare("number", "go on behind the clip", 0.0, low=0, high=LONGEST, unit="seconds")
     strength: float = declare("number", "how far from the clip: 1 is from noise alone", 1.0, low=0, high=1, above=True)
     person: int = declare("whole", "whom to change, of several people in one motion, counted from 0", 0, low=0, high=7)
+    source: Any = declare("motion", "a clip whose beginning the parts that do not stay follow, instead of words")
+    look: tuple[float, float, float] | None = declare(
+        "number", "turn the head to this place: x, y, z", None, low=-1000, high=1000, size=3, unit="metres"
+    )
+    look_at: int | None = declare("whole", "turn the head to this person's, counted from 0", None, low=0, high=7)
     sampling: Sampling = group(Sampling(count=1), *SAMPLED)

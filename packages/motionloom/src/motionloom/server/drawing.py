@@ -46,7 +46,9 @@ def plan_of(request: JobRequest) -> Plan:
     target = None
     if request.task in ("predict", "switch"):
         people = [cropped(people[0], values)]
-    if request.other is not None:
+    if request.task == "edit" and request.other is not None:
+        target = request.other.people[0]
+    elif request.other is not None:
         past, target = people[0], request.other.people[0]
         if past.skeleton != target.skeleton:
             past, target = to_smpl22(past), to_smpl22(target)

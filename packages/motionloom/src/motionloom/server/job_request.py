@@ -53,7 +53,7 @@ class JobRequest:
     """The goal item by item, each with its name, such as ``joints[0]``."""
     motion: Stored | None = None
     other: Stored | None = None
-    """What is switched to."""
+    """What is switched to, or what an edit takes parts of."""
     taught: tuple[Applied, ...] = ()
     """Adapters of the prior for this job."""
     kept: "tuple[Motion, list[Block]] | None" = None
@@ -164,7 +164,10 @@ class _Reader:
         return self.with_goal(found, SECONDS)
 
     def edit(self, found: JobRequest) -> JobRequest:
-        return replace(found, motion=self.motion("motion", found.values.person))
+        if "look_at" in self.given:
+            self.motion("motion", found.values.look_at)
+        other = self.motion("source") if "source" in self.given else None
+        return replace(found, motion=self.motion("motion", found.values.person), other=other)
 
     def predict(self, found: JobRequest) -> JobRequest:
         self.together(found)

@@ -6,7 +6,6 @@ sampled goes through the network, so that the time does not grow with the length
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal, TypeAlias, Unpack
 
 import numpy as np
@@ -23,15 +22,13 @@ from motionloom.requests.fields import specs
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
 from motionloom.retarget import to_smpl22
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.inpaint import inpaint_motion
+from motionloom.tasks.laid import Lay, Look, Span, Spanned, check_parts, joints_of, kept_joints
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
-    Kept,
     apply_sample,
     carried_level,
     concatenated,
-    kept_parts,
     person_at_20,
     splice,
     standing,
@@ -48,17 +45,12 @@ BLEND = 1.0
 """Seconds that are sampled anew for a loop."""
 NEAR = (0.5, np.radians(45))
 """Metres and radians between the ends of a clip within which a loop closes in the world too."""
-PARTS = ("root", "root_horizontal", *SMPL22.groups, *SMPL22.names)
-
-Span = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Redraw:
+class Redraw(Spanned):
     """Some time of a clip, or some parts of it, sampled anew."""
 
-    spans: Sequence[Span] = ()
-    """Stretches (start, end) in seconds; none: the whole clip."""
     keep: Sequence[str] = ()
     """Parts whose own rotations stay: joints and groups of the 22-joint skeleton, ``root`` (its place),
     ``root_horizontal``."""
@@ -66,33 +58,17 @@ class Redraw:
     """How much noise the old motion gets before it is denoised again, above 0 to 1 (nothing of it is left)."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         specs(Edit)["strength"].check(self.strength, "strength")
-        unknown = [name for name in self.keep if name not in PARTS]
-        if unknown:
-            raise MotionloomError(f"no part called {unknown[0]!r} to keep; the parts are {', '.join(PARTS)}")
-        if len(_joints(self.keep)) == len(SMPL22):
-            raise MotionloomError("nothing to change: all joints are kept; keep fewer")
-        for (start, stop), (following, end) in pairwise(sorted(self.spans)):
-            if following < stop:
-                raise MotionloomError(f"the stretches {start:g} to {stop:g} s and {following:g} to {end:g} s overlap")
+        check_parts(self.keep)
 
     def check(self, length: float, frame: float) -> float:
         """The seconds of a clip of ``length`` afterwards; raises MotionloomError where it cannot be changed so."""
-        for start, stop in self.spans:
-            if not (0 <= start < stop <= length + frame and stop - start >= 3 / FPS):
-                raise MotionloomError(
-                    f"no stretch from {start:g} to {stop:g} s: a clip of {length:.2f} s has stretches from 0 to "
-                    f"{length:.2f}, at least {3 / FPS:g} s long"
-                )
+        length = super().check(length, frame)
         longest = max((stop - start for start, stop in self.spans), default=length)
         if longest > LONGEST:
             raise MotionloomError(f"{longest:.0f} s cannot be sampled at once; name stretches of at most {LONGEST:g} s")
         return length
-
-    def frames(self, clip: Motion) -> list[tuple[int, int]]:
-        """First frames of the stretches and those behind their last."""
-        ends = [(round(start * clip.fps), round(stop * clip.fps)) for start, stop in sorted(self.spans)]
-        return [(start, min(stop, len(clip))) for start, stop in ends] or [(0, len(clip))]
 
     def apply(self, sampler: "_Sampler", clip: Motion, seed: int) -> Motion:
         """The clip with its stretches sampled, one after the other."""
@@ -148,7 +124,7 @@ class Loop:
         return _looped(sampler, clip, self.blend, seed)
 
 
-Change: TypeAlias = Redraw | Extend | Loop
+Change: TypeAlias = Redraw | Extend | Loop | Lay | Look
 
 
 def edit(
@@ -169,7 +145,7 @@ def edit(
         prior: weights that make HumanML3D's 263 numbers.
         motion: the clip, on any humanoid skeleton and at any rate; what is not changed comes back bit for bit.
         text: what the person does; an empty one asks for nothing in particular.
-        changes: `Redraw`, `Extend` and `Loop`, one after the other; a text alone redraws the whole clip.
+        changes: `Redraw`, `Extend`, `Loop`, `Lay` and `Look`, one after the other; a text alone redraws the whole clip.
         skeleton: the clip's own, or the 22-joint person. The result stands where the clip stood.
         foot_lock: keep planted feet still where legs are sampled.
         sampling: or single settings of it as keywords; version i of ``count`` is sampled from ``seed + i``.
@@ -180,7 +156,7 @@ def edit(
 
     (Inpainting: Lugmayr et al. 2022; of motion: Tevet et al. 2023. Strength: Meng et al., SDEdit, 2022.)
     """
-    asked = [changes] if isinstance(changes, Redraw | Extend | Loop) else list(changes)
+    asked = [changes] if isinstance(changes, Change) else list(changes)
     asked = asked or changes_asked(text)
     chosen = Sampling.of(sampling, settings)
     chosen.levels(prior.schedule)
@@ -188,7 +164,7 @@ def edit(
         raise MotionloomError(f"the skeleton is 'own' or 'smpl'; got {skeleton!r}")
     _check(prior, motion, asked)
     clip = motion if skeleton == "own" else to_smpl22(motion)
-    stages = sum(len(one.frames(clip)) if isinstance(one, Redraw) else 1 for one in asked)
+    stages = sum(len(one.frames(clip)) if isinstance(one, Redraw) else not isinstance(one, Spanned) for one in asked)
     seeds = chosen.seeds(chosen.number())
     sampler = _Sampler(prior, text, chosen, foot_lock, _in_stages(progress, len(seeds) * stages, chosen.steps))
     made = []
@@ -220,16 +196,25 @@ def changes_asked(
     extend: float = 0.0,
     strength: float = 1.0,
     blend: float = BLEND,
+    source: Motion | None = None,
+    look: NDArray[np.float64] | None = None,
 ) -> list[Change]:
     """What single options ask for: with neither ``between`` nor ``extend`` a text is about the whole clip.
 
-    Raises MotionloomError where nothing is asked.
+    source: a clip whose parts take the place of a text. look: where the head looks, as of `Look`. Raises
+    MotionloomError where nothing is asked, and for a text beside a source.
     """
     asked: list[Change] = []
-    if between or (text.strip() and not extend):
+    said = bool(text.strip()) and not extend
+    if source is not None:
+        if said:
+            raise MotionloomError("parts do what a text says or what another clip does; leave out one of them")
+        asked.append(Lay(tuple(between), source, tuple(keep)))
+    elif said or (between and look is None):
         asked.append(Redraw(tuple(between), tuple(keep), strength))
     elif keep:
         raise MotionloomError("kept parts belong to a text or a stretch, and there is neither; add one")
+    asked += [Look(tuple(between), look)] if look is not None else []
     asked += [Extend(extend)] if extend else []
     asked += [Loop(blend)] if loop else []
     if not asked:
@@ -269,7 +254,7 @@ class _Sampler:
 def kept_numbers(keep: Sequence[str]) -> NDArray[np.bool_]:
     """(263,) True at the features of the kept parts."""
     chosen = layout.mask([name for name in keep if name.startswith("root")])
-    joints = _joints(keep)
+    joints = joints_of(keep)
     if 0 in joints:
         chosen |= layout.mask("root")
     for joint in joints:
@@ -279,16 +264,6 @@ def kept_numbers(keep: Sequence[str]) -> NDArray[np.bool_]:
     if set(layout.FEET) <= joints:
         chosen[layout.LAYOUT["contacts"]] = True
     return chosen
-
-
-def kept_joints(clip: Motion, keep: Sequence[str]) -> Kept:
-    """The same on the clip's own skeleton."""
-    whole, level = "root" in keep, "root" in keep or "root_horizontal" in keep
-    return kept_parts(clip.skeleton, _joints(keep), np.array([level, whole, level]))
-
-
-def _joints(keep: Sequence[str]) -> frozenset[int]:
-    return frozenset(SMPL22.resolve(name for name in keep if name not in ("root", "root_horizontal")))
 
 
 # What the changes do

@@ -10,12 +10,16 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import Goal
 from motionloom.goals.hold import FixedJoints
 from motionloom.goals.timeline import Timeline
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
+from motionloom.retarget import joints22
+from motionloom.skeleton import SMPL22
 from motionloom.tasks import control, duet, edit, long, pair, predict, redraw, text, worded
 from motionloom.tasks.adapting import AdaptedPriors, adapt
 from motionloom.tasks.sampling import Moves, Progress
@@ -90,7 +94,7 @@ class Plan:
     kept: tuple[Motion, Sequence[redraw.Block]] | None = None
     """A motion of an earlier timeline and what it was sampled from: blocks that ask for the same keep its frames."""
     target: Motion | None = None
-    """What is switched to, on the skeleton and at the rate of the first of them."""
+    """What is switched to, on the skeleton and at the rate of the first of them; what an edit takes parts of."""
     hold: FixedJoints | None = None
     taught: tuple[Applied, ...] = ()
     """Adapters of the prior for these motions, besides those that the models have."""
@@ -267,8 +271,11 @@ def _controlled(made: control.Controlled) -> Result:
 def _edited(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     values, people = plan.values, list(plan.people)
     names = ("keep", "between", "loop", "blend", "extend", "strength")
-    changes = edit.changes_asked(plan.prompt, **{name: getattr(values, name) for name in names})
-    own = people[values.person]
+    own, given = people[values.person], {name: getattr(values, name) for name in names}
+    look = None if values.look is None else np.asarray(values.look)
+    if values.look_at is not None:
+        look = joints22(people[values.look_at])[:, SMPL22.index("head")]
+    changes = edit.changes_asked(plan.prompt, source=plan.target, look=look, **given)
     how = {"foot_lock": values.foot_lock, "sampling": plan.sampling, "progress": progress}
     for motion in edit.edit(models.prior, own, plan.prompt, changes, **how):
         people[values.person] = motion

@@ -1,0 +1,127 @@
+"""Changes of a clip without sampling: parts of another clip are laid over it, and a head looks somewhere."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.blending import smoothstep
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS
+from motionloom.kinematics.gaze import looking
+from motionloom.motion import Motion
+from motionloom.retarget import to_smpl22
+from motionloom.retarget.onto import onto, place_of, with_place
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.splice import Kept, carried_level, kept_parts, splice, standing
+
+Span = tuple[float, float]
+
+EASE = 0.4
+"""Seconds in which a head turns to what it looks at, and back."""
+PARTS = ("root", "root_horizontal", *SMPL22.groups, *SMPL22.names)
+
+
+@dataclass(frozen=True)
+class Spanned:
+    """A change of some time of a clip."""
+
+    spans: Sequence[Span] = ()
+    """Stretches (start, end) in seconds; none: the whole clip."""
+
+    def __post_init__(self) -> None:
+        for (start, stop), (following, end) in pairwise(sorted(self.spans)):
+            if following < stop:
+                raise MotionloomError(f"the stretches {start:g} to {stop:g} s and {following:g} to {end:g} s overlap")
+
+    def check(self, length: float, frame: float) -> float:
+        """The seconds of a clip of ``length`` afterwards; raises MotionloomError where it cannot be changed so."""
+        for start, stop in self.spans:
+            if not (0 <= start < stop <= length + frame and stop - start >= 3 / FPS):
+                raise MotionloomError(
+                    f"no stretch from {start:g} to {stop:g} s: a clip of {length:.2f} s has stretches from 0 to "
+                    f"{length:.2f}, at least {3 / FPS:g} s long"
+                )
+        return length
+
+    def frames(self, clip: Motion) -> list[tuple[int, int]]:
+        """First frames of the stretches and those behind their last."""
+        ends = [(round(start * clip.fps), round(stop * clip.fps)) for start, stop in sorted(self.spans)]
+        return [(start, min(stop, len(clip))) for start, stop in ends] or [(0, len(clip))]
+
+
+@dataclass(frozen=True, eq=False)
+class Lay(Spanned):
+    """Parts that do what they do in another clip, from its beginning on, in each stretch."""
+
+    source: Motion | None = None
+    keep: Sequence[str] = ()
+    """Parts that stay, as of `Redraw`."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self.keep)
+
+    def apply(self, sampler: Any, clip: Motion, seed: int) -> Motion:
+        """The clip with the parts in it; a stretch is no longer than the source."""
+        assert self.source is not None
+        source = self.source.resample(clip.fps)
+        for first, last in self.frames(clip):
+            count = min(last - first, len(source))
+            clip = _laid(clip, source.frames(0, count), first, kept_joints(clip, self.keep))
+        return clip
+
+
+@dataclass(frozen=True, eq=False)
+class Look(Spanned):
+    """A head that looks at a place, or at places."""
+
+    at: NDArray[np.float64] | None = None
+    """(3,) metres in the world, or (frames of the clip, 3)."""
+
+    def apply(self, sampler: Any, clip: Motion, seed: int) -> Motion:
+        """The clip with its head turned."""
+        assert self.at is not None
+        weights = np.zeros(len(clip))
+        for first, last in self.frames(clip):
+            # A stretch that begins with the clip, or ends with it, has no side to come from.
+            begin = np.inf if first == 0 else (np.arange(last - first) + 1) / clip.fps
+            end = np.inf if last == len(clip) else (last - first - np.arange(last - first)) / clip.fps
+            weights[first:last] = smoothstep(np.minimum(begin, end) / EASE)
+        return looking(clip, self.at, weights)
+
+
+def check_parts(keep: Sequence[str]) -> None:
+    """Raise MotionloomError for parts that there are not, and where all of the body stays."""
+    unknown = [name for name in keep if name not in PARTS]
+    if unknown:
+        raise MotionloomError(f"no part called {unknown[0]!r} to keep; the parts are {', '.join(PARTS)}")
+    if len(joints_of(keep)) == len(SMPL22):
+        raise MotionloomError("nothing to change: all joints are kept; keep fewer")
+
+
+def joints_of(keep: Sequence[str]) -> frozenset[int]:
+    """The joints of parts, out of 22."""
+    return frozenset(SMPL22.resolve(name for name in keep if name not in ("root", "root_horizontal")))
+
+
+def kept_joints(clip: Motion, keep: Sequence[str]) -> Kept:
+    """The kept parts on the clip's own skeleton."""
+    whole, level = "root" in keep, "root" in keep or "root_horizontal" in keep
+    return kept_parts(clip.skeleton, joints_of(keep), np.array([level, whole, level]))
+
+
+def _laid(clip: Motion, source: Motion, first: int, kept: Kept) -> Motion:
+    last = first + len(source)
+    there = clip.frames(first, last)
+    piece = source if source.skeleton == clip.skeleton else onto(to_smpl22(source), there)
+    (to, facing), (begin, faced) = standing(there, 0), standing(piece, 0)
+    piece = carried_level(piece, rot.multiply(facing, rot.inverse(faced)), begin, to)
+    # Outside it is as at its ends: from how far that is from the clip, the splice eases in and out.
+    at = np.clip(np.arange(len(clip)) - first, 0, len(piece) - 1)
+    made = with_place(replace(clip, rotations=piece.rotations[at]), place_of(piece)[at])
+    return splice(clip, made, first, last=last, kept=kept)

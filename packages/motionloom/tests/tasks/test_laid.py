@@ -1,0 +1,134 @@
+"""Parts of another clip laid over a clip, and heads that look somewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.kinematics.gaze import NOD, TURN, looking
+from motionloom.motion import Motion
+from motionloom.requests.edit import Edit
+from motionloom.retarget import from_smpl22, joints22
+from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.tasks.edit import changes_asked, edit
+from motionloom.tasks.laid import Lay, Look
+from motionloom.tasks.run import Models, Plan, run
+from tests.recorded import tiny
+from tests.tasks.test_edit import person, rig
+
+FORWARD = np.array([0.0, 0.0, 1.0])
+HEAD, SPINE, RIGHT_WRIST = 15, 9, 21
+ALL_BUT_THE_ARM = ("lower_body", "torso", "head_neck", "left_arm")
+
+
+def waving(seconds: float, fps: float = 30.0) -> Motion:
+    """Somebody who stands, elsewhere, with the right arm up."""
+    frames = round(seconds * fps)
+    turns = np.zeros((frames, 22, 3))
+    turns[:, 0, 1], turns[:, 17, 2] = -1.0, -1.3
+    return Motion(SMPL22, fps, np.tile([9.0, 0.95, 9.0], (frames, 1)), rot.rotvec_to_quat(turns))
+
+
+def changed(clip: Motion, *changes: Lay | Look) -> Motion:
+    """One version, of weights that are not used."""
+    return edit(tiny.prior(), clip, "", changes)[0]
+
+
+def gaze(motion: Motion) -> np.ndarray:
+    """(frames, 3) where the head of a 22-joint person faces."""
+    return rot.rotate(motion.world_rotations()[:, HEAD], FORWARD)
+
+
+def test_an_arm_follows_another_clip_and_the_rest_stays() -> None:
+    clip = person(4.0)
+    made = changed(clip, Lay(((1.0, 3.0),), waving(5.0), ALL_BUT_THE_ARM))
+    others = [joint for joint in range(22) if joint not in SMPL22.groups["right_arm"]]
+    assert np.array_equal(made.rotations[:, others], clip.rotations[:, others])
+    assert np.array_equal(made.root, clip.root)
+    assert np.array_equal(made.rotations[:20], clip.rotations[:20])
+    assert np.array_equal(made.rotations[60:], clip.rotations[60:])
+    assert np.abs(made.rotations[40, 17] - waving(1.0).rotations[0, 17]).max() < 1e-6
+    steps = np.linalg.norm(np.diff(made.positions()[:, RIGHT_WRIST], axis=0), axis=-1)
+    assert steps.max() < 0.3, "the arm goes up in a few frames"
+
+
+def test_another_body_follows_as_well_and_no_longer_than_the_clip_lasts() -> None:
+    clip = from_smpl22(person(4.0), rig())
+    made = changed(clip, Lay(((1.0, 4.0),), waving(1.0), ALL_BUT_THE_ARM))
+    up = joints22(made)[:, RIGHT_WRIST, 1] - joints22(clip)[:, RIGHT_WRIST, 1]
+    assert up[25:35].min() > 0.3
+    assert np.array_equal(made.rotations[40:], clip.rotations[40:])
+
+
+@pytest.mark.parametrize("body", [None, rig()], ids=["smpl", "another"])
+def test_a_head_looks_at_a_place(body: Skeleton | None) -> None:
+    clip = person(3.0) if body is None else from_smpl22(person(3.0), body)
+    ahead = rot.rotate(person(3.0).world_rotations()[:, SPINE], FORWARD)
+    eyes = joints22(clip)[:, HEAD]
+    place = eyes + 3 * rot.rotate(rot.rotvec_to_quat(np.array([0.0, 0.6, 0.0])), ahead)
+    made = looking(clip, place, np.ones(len(clip)))
+    moved = np.linalg.norm(joints22(made)[:, HEAD] - eyes, axis=-1)
+    assert moved.max() < 0.08, "a neck is short"
+    legs = [0, 1, 2, 4, 5, 7, 8, 16, 17, 20, 21]
+    assert np.allclose(joints22(made)[:, legs], joints22(clip)[:, legs])
+    if body is None:
+        wanted = place - made.positions()[:, HEAD]
+        off = np.arccos(np.clip((gaze(made) * wanted).sum(-1) / np.linalg.norm(wanted, axis=-1), -1, 1))
+        assert np.degrees(off).max() < 4
+
+
+def test_a_head_turns_no_further_than_a_neck_can_and_not_to_what_is_behind() -> None:
+    clip = waving(2.0)
+    ahead = gaze(clip)[0]
+    for degrees in (90, 180):
+        turn = rot.rotvec_to_quat(np.array([0.0, np.radians(degrees), 0.0]))
+        place = clip.positions()[0, HEAD] + 50 * rot.rotate(turn, ahead)
+        made = looking(clip, place, np.ones(len(clip)))
+        angle = np.arccos(gaze(made)[0] @ ahead)
+        assert angle == pytest.approx(TURN if degrees == 90 else 0.0, abs=1e-6)
+    high = looking(clip, clip.positions()[0, HEAD] + [0, 50, 0] + ahead, np.ones(len(clip)))
+    assert np.arccos(gaze(high)[0] @ ahead) == pytest.approx(NOD, abs=1e-6)
+
+
+def test_a_look_begins_and_ends_softly() -> None:
+    clip = waving(4.0)
+    made = changed(clip, Look(((1.0, 3.0),), np.array([12.0, 1.6, 9.0])))
+    assert np.array_equal(made.rotations[:30], clip.rotations[:30])
+    assert np.array_equal(made.rotations[90:], clip.rotations[90:])
+    turned = np.linalg.norm(np.diff(gaze(made), axis=0), axis=-1)
+    assert 0.01 < turned.max() < 0.2
+    whole = changed(clip, Look((), np.array([12.0, 1.6, 9.0])))
+    assert np.abs(np.diff(gaze(whole), axis=0)).max() < 1e-9, "there is no other side to come from"
+
+
+def test_what_is_asked_becomes_changes_and_what_cannot_be_is_refused() -> None:
+    place = np.zeros(3)
+    assert [type(one) for one in changes_asked("", source=waving(1.0), keep=["head"])] == [Lay]
+    assert [type(one).__name__ for one in changes_asked("waves", look=place)] == ["Redraw", "Look"]
+    assert [type(one).__name__ for one in changes_asked("", look=place, between=[(0, 1)])] == ["Look"]
+    with pytest.raises(MotionloomError, match="a text says or what another clip does; leave out one"):
+        changes_asked("waves", source=waving(1.0))
+    with pytest.raises(MotionloomError, match="no part called 'tail' to keep"):
+        Lay((), waving(1.0), ["tail"])
+    with pytest.raises(MotionloomError, match="no stretch from 1 to 9 s"):
+        changed(person(4.0), Look(((1.0, 9.0),), place))
+    with pytest.raises(MotionloomError, match="look must be a list of 3 numbers"):
+        Edit(motion=person(1.0), look=(1.0, 2.0))  # type: ignore[arg-type]
+
+
+def test_somebody_looks_at_the_other_person() -> None:
+    one, two = waving(2.0), waving(2.0)
+    two = replace(two, root=two.root + np.array([2.0, 0.0, 1.0]))
+    values = Edit(motion=one, person=0, look_at=1)
+    plan = Plan(task="edit", values=values, sampling=values.sampling, people=(one, two))
+    (result,) = run(plan, Models(tiny.prior()))
+    first, second = result.people
+    assert second is two
+    wanted = two.positions()[:, HEAD] - first.positions()[:, HEAD]
+    before, after = (
+        np.degrees(np.arccos((gaze(motion) * wanted).sum(-1) / np.linalg.norm(wanted, axis=-1)))[20]
+        for motion in (one, first)
+    )
+    assert after < before - 30
