@@ -23,7 +23,9 @@ import { Projects } from "./app/projects";
 import { newSession } from "./app/session";
 import { Signal } from "./app/signal";
 import type { MotionClip } from "./body/clip";
+import { backdropDialog } from "./panels/backdrop";
 import { stageBar, topBar, transport } from "./panels/bars";
+import { filmDialog } from "./panels/film";
 import { inspector } from "./panels/inspector";
 import { jointDialog } from "./panels/joints";
 import { livePanel } from "./panels/live";
@@ -125,6 +127,8 @@ function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
   recentProjects(app, projects);
   nameDialog(app, projects);
   jointDialog(app, files);
+  filmDialog(app, stage);
+  backdropDialog(app, stage.scene);
   startCard(app, projects, part("start"), (pixels) => stage.scene.lift(pixels));
   splits();
   listen(app, timeline, part("tracks"));

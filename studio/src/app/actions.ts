@@ -309,6 +309,26 @@ function stage({ app, deeds, live, stage }: Parts): Actions {
     frameAll: { group, label: "Show the whole motion", keys: ["Shift+F"], run: () => stage.frameAll() },
     around: { group, label: "Ghosts before and behind the playhead", keys: ["Shift+G"], run: flip("around") },
     trails: { group, label: "Trails of hips, hands and feet", keys: ["I"], run: flip("trails") },
+    views: {
+      group,
+      label: "Front and side beside it, front and above, or neither",
+      keys: ["Shift+X"],
+      run: () =>
+        session.update({ views: ({ null: "side", side: "above", above: null } as const)[`${session.value.views}`] }),
+    },
+    meeting: {
+      group,
+      label: "To the next meeting of hands of two people, to move it",
+      keys: ["Shift+T"],
+      isThere: () => project.value.people.length > 1,
+      run: () => stage.meetings.next(),
+    },
+    backdrop: {
+      group,
+      label: "A colour or a picture behind the people",
+      keys: ["Shift+B"],
+      run: () => session.update({ dialog: "backdrop" }),
+    },
     people: {
       group,
       label: "One person or two",
@@ -394,6 +414,7 @@ export function nudged(event: KeyboardEvent, { app, stage }: Parts): boolean {
   if (tool === "path" && event.key === "Enter") stage.path.put();
   else if (!way) return false;
   else if (tool === "path") stage.path.nudge(way[0], way[2]);
+  else if (tool === "meeting") stage.meetings.nudge(...way);
   else stage.targets.nudge(...way);
   return true;
 }

@@ -194,7 +194,8 @@ async function glbContents(file: File): Promise<{ hasMotion: boolean; hasBody: b
   };
 }
 
-function fileName(name: string): string {
+/** The name of a project as that of a file. */
+export function fileName(name: string): string {
   return (
     name
       .trim()

@@ -3,6 +3,7 @@
 import { SUFFIX } from "../project/file";
 import type { Format } from "../server/api";
 import type { Action, Actions, Parts } from "./actions";
+import { shownClip } from "./app";
 import type { Dialog } from "./session";
 
 type Written = readonly [string, string, readonly string[], Format | "share" | "yaml", string];
@@ -44,14 +45,22 @@ const EXPORTS: Readonly<Record<string, Written>> = {
 
 /** The name of an export in its menu. */
 export function exportName(key: string): string {
-  return EXPORTS[key]?.[0] ?? "Project file";
+  return EXPORTS[key]?.[0] ?? (key === "film" ? "Film of the stage" : "Project file");
 }
 
 /** In the order of the menu. */
-export const EXPORT_KEYS = [...Object.keys(EXPORTS), "save"];
+export const EXPORT_KEYS = [...Object.keys(EXPORTS), "film", "save"];
 
 export function exports({ app, files }: Parts): Actions {
-  return Object.fromEntries(
+  const film: Action = {
+    group: "Export",
+    label: "Film the stage (MP4 or GIF)",
+    keys: ["Shift+V"],
+    note: "As you see it, or once around the person",
+    isThere: () => shownClip(app) !== null && !app.live.value,
+    run: () => shownClip(app) && !app.live.value && app.session.update({ dialog: "film" }),
+  };
+  const written = Object.fromEntries(
     Object.entries(EXPORTS).map(([key, [, label, keys, format, note]]): [string, Action] => [
       key,
       {
@@ -64,6 +73,7 @@ export function exports({ app, files }: Parts): Actions {
       },
     ]),
   );
+  return { ...written, film };
 }
 
 export function projects({ app, files, projects, choose }: Parts): Actions {

@@ -5,7 +5,10 @@ import { type Project, type Range, type Stamp, type Vec3, newId } from "../proje
 import type { Problem } from "../project/places";
 import { Signal } from "./signal";
 
-export type Tool = "select" | "path" | "target";
+export type Tool = "select" | "path" | "target" | "meeting";
+
+/** What is seen beside the main picture besides the front; null: nothing. */
+export type Views = "side" | "above" | null;
 
 export type Selection =
   | { readonly kind: "none" }
@@ -35,7 +38,7 @@ export interface Unnamed {
 }
 
 /** What lies over the page and waits for an answer. */
-export type Dialog = "help" | "palette" | "history" | "projects" | "name" | "joints";
+export type Dialog = "help" | "palette" | "history" | "projects" | "name" | "joints" | "film" | "backdrop";
 
 /** How far a draw is; null where none is under way. */
 export interface Drawing {
@@ -75,6 +78,7 @@ export interface Session {
   /** Whether the timeline shows how high and how fast the joint is. */
   readonly curves: boolean;
   readonly sideBySide: boolean;
+  readonly views: Views;
   readonly snapping: boolean;
   /** Whether a block that is moved lies over others, which stay when they are, or pushes them aside. */
   readonly overwriting: boolean;
@@ -130,6 +134,7 @@ export function newSession(): Signal<Session> {
     trails: false,
     curves: false,
     sideBySide: false,
+    views: null,
     snapping: true,
     overwriting: false,
     dialog: null,

@@ -6,7 +6,7 @@ import { trackJobs } from "./tracks";
 import { needsWay } from "./asks";
 import type { Place, Problem } from "./places";
 import { between } from "./timeline";
-import type { ComposeRequest, DuetRequest, EditRequest } from "../server/types";
+import type { ComposeRequest, DuetRequest, EditRequest, Goals } from "../server/types";
 
 /** One job; where `motion` is missing in an edit, it is the result of the job before. */
 export type Job = ComposeRequest | DuetRequest | UnfinishedEdit;
@@ -106,6 +106,10 @@ function duet(project: Project): Job {
   const person = asked(project);
   const goals = goalOf(project.people[person]!, length(project));
   const timeline = timelineOf(project);
+  const other = goalOf(project.people[1 - person]!, length(project));
+  // Who goes where has to be known of both.
+  if (timeline.path && goals?.path && other?.path)
+    return { task: "duet", timeline, other_goals: other as Goals, seed, count, person };
   if (!goals || goals.path || person === 0) return { task: "duet", timeline, seed, count, person };
   return { task: "duet", prompt: timeline.segments[0]!.text, seconds: length(project), goals, seed, count, person };
 }

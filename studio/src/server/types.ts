@@ -227,6 +227,8 @@ export interface DuetRequest {
   readonly react_to?: string;
   /** what a goal file holds, for one of the two */
   readonly goals?: Goals;
+  /** the same for the other of the two; with words or a timeline, and goals */
+  readonly other_goals?: Goals;
   /** whose the goals are, counted from 0 */
   readonly person?: number;
   /** length: 6, or what a past gets: 3, in seconds */

@@ -1,74 +1,155 @@
-/** A figure of turned wood: capsules between the 22 joints, set from their places alone. */
+/** A figure of turned wood: skins over the 22 joints, set from their places alone. */
 
 import * as THREE from "three";
-import { HEAD, LEFT, NECK, PELVIS, RIGHT, SIDES, SPINE1, SPINE2, SPINE3 } from "../body/skeleton";
+import { HEAD, LEFT, NECK, PELVIS, RIGHT, SIDES, SPINE1, SPINE2, SPINE3, type Side } from "../body/skeleton";
+import { Loft, type Ring, solid } from "./loft";
 import type { FigureLook } from "./theme";
 
-/** From joint, to joint, radius there and here (metres). */
-const LIMBS: readonly (readonly [number, number, number, number])[] = [
-  ...SIDES.flatMap(({ hip, knee, ankle, collar, shoulder, elbow, wrist }) => [
-    [hip, knee, 0.082, 0.054] as const,
-    [knee, ankle, 0.054, 0.034] as const,
-    [collar, shoulder, 0.045, 0.048] as const,
-    [shoulder, elbow, 0.047, 0.036] as const,
-    [elbow, wrist, 0.037, 0.025] as const,
-  ]),
-  [NECK, HEAD, 0.042, 0.04],
+/** A ring: how far from the first joint to the second (1: there), half its width and depth, how far it is ahead. */
+type Station = readonly [number, number, number, number, number?, number?];
+
+const TORSO: readonly Station[] = [
+  [PELVIS, SPINE1, -1.28, 0, 0],
+  [PELVIS, SPINE1, -1.2, 0.055, 0.05, -0.012],
+  [PELVIS, SPINE1, -0.98, 0.11, 0.085, -0.012],
+  [PELVIS, SPINE1, -0.58, 0.15, 0.105, -0.008],
+  [PELVIS, SPINE1, -0.1, 0.155, 0.112],
+  [PELVIS, SPINE1, 0.4, 0.144, 0.104, 0.008],
+  [SPINE1, SPINE2, 0, 0.128, 0.095, 0.018],
+  [SPINE1, SPINE2, 0.5, 0.124, 0.092, 0.02],
+  [SPINE2, SPINE3, 0, 0.131, 0.096, 0.02],
+  [SPINE3, NECK, 0, 0.145, 0.104, 0.024],
+  [SPINE3, NECK, 0.25, 0.157, 0.11, 0.028],
+  [SPINE3, NECK, 0.48, 0.162, 0.106, 0.024],
+  [SPINE3, NECK, 0.64, 0.15, 0.09, 0.014],
+  [SPINE3, NECK, 0.78, 0.118, 0.072, 0.006],
+  [SPINE3, NECK, 0.91, 0.076, 0.058, 0.004],
+  [NECK, HEAD, 0.06, 0.053, 0.052],
+  [NECK, HEAD, 0.6, 0.047, 0.05],
+  [NECK, HEAD, 1.2, 0.045, 0.048],
+];
+/** Half widths of legs and arms, which are round. */
+const LEG: readonly (readonly [keyof Side, keyof Side, number, number, number?])[] = [
+  ["hip", "knee", -0.2, 0],
+  ["hip", "knee", -0.19, 0.035],
+  ["hip", "knee", -0.15, 0.066],
+  ["hip", "knee", -0.07, 0.084],
+  ["hip", "knee", 0.06, 0.09],
+  ["hip", "knee", 0.22, 0.086],
+  ["hip", "knee", 0.42, 0.077],
+  ["hip", "knee", 0.6, 0.067],
+  ["hip", "knee", 0.75, 0.059],
+  ["hip", "knee", 0.86, 0.055],
+  ["hip", "knee", 0.94, 0.054, 0.004],
+  ["knee", "ankle", 0.0, 0.054, 0.005],
+  ["knee", "ankle", 0.06, 0.052, 0.003],
+  ["knee", "ankle", 0.14, 0.051, -0.002],
+  ["knee", "ankle", 0.26, 0.053, -0.009],
+  ["knee", "ankle", 0.4, 0.05, -0.01],
+  ["knee", "ankle", 0.58, 0.042, -0.006],
+  ["knee", "ankle", 0.75, 0.035],
+  ["knee", "ankle", 0.9, 0.031],
+  ["knee", "ankle", 1.02, 0.031],
+  ["knee", "ankle", 1.07, 0.02],
+  ["knee", "ankle", 1.09, 0],
+];
+const ARM: typeof LEG = [
+  ["shoulder", "elbow", -0.21, 0],
+  ["shoulder", "elbow", -0.2, 0.022],
+  ["shoulder", "elbow", -0.16, 0.041],
+  ["shoulder", "elbow", -0.08, 0.053],
+  ["shoulder", "elbow", 0.04, 0.056],
+  ["shoulder", "elbow", 0.2, 0.051],
+  ["shoulder", "elbow", 0.4, 0.045],
+  ["shoulder", "elbow", 0.6, 0.041],
+  ["shoulder", "elbow", 0.78, 0.037],
+  ["shoulder", "elbow", 0.9, 0.036],
+  ["elbow", "wrist", 0, 0.036],
+  ["elbow", "wrist", 0.1, 0.037],
+  ["elbow", "wrist", 0.25, 0.038],
+  ["elbow", "wrist", 0.45, 0.034],
+  ["elbow", "wrist", 0.68, 0.028],
+  ["elbow", "wrist", 0.88, 0.0235],
+  ["elbow", "wrist", 1.03, 0.022],
 ];
 
-/** Balls where limbs meet. */
-const BALLS: readonly (readonly [number, number])[] = SIDES.flatMap(({ knee, ankle, shoulder, elbow, wrist }) => [
-  [knee, 0.056] as const,
-  [ankle, 0.038] as const,
-  [shoulder, 0.055] as const,
-  [elbow, 0.04] as const,
-  [wrist, 0.028] as const,
-]);
+/** From the right shoulder over the chest to the left one. */
+const YOKE: readonly Station[] = [
+  [RIGHT.shoulder, RIGHT.collar, -0.3, 0, 0],
+  [RIGHT.shoulder, RIGHT.collar, -0.26, 0.025],
+  [RIGHT.shoulder, RIGHT.collar, -0.1, 0.048],
+  [RIGHT.shoulder, RIGHT.collar, 0.2, 0.057],
+  [RIGHT.shoulder, RIGHT.collar, 0.65, 0.06],
+  [RIGHT.collar, LEFT.collar, 0.5, 0.06],
+  [LEFT.shoulder, LEFT.collar, 0.65, 0.06],
+  [LEFT.shoulder, LEFT.collar, 0.2, 0.057],
+  [LEFT.shoulder, LEFT.collar, -0.1, 0.048],
+  [LEFT.shoulder, LEFT.collar, -0.26, 0.025],
+  [LEFT.shoulder, LEFT.collar, -0.3, 0, 0],
+];
 
-interface Part {
-  readonly mesh: THREE.Mesh;
-  place(joints: readonly THREE.Vector3[], frame: Frame): void;
-}
-
-/** Directions of the body that the places give. */
-interface Frame {
-  readonly hips: THREE.Vector3;
-  readonly chest: THREE.Vector3;
-  readonly chestUp: THREE.Vector3;
-  readonly pelvisUp: THREE.Vector3;
-  readonly face: THREE.Vector3;
-}
-
-const UP = new THREE.Vector3(0, 1, 0);
-const BALL = new THREE.SphereGeometry(1, 24, 16);
-/** For what is a few centimetres large. */
-const SMALL = new THREE.SphereGeometry(1, 16, 10);
+/** Hand and thumb from the wrist along +Y, with the thumb on the side of +X and the palm to +Z. */
+const HAND = solid(
+  [
+    [-0.012, 0.021, 0.02],
+    [0.012, 0.025, 0.019],
+    [0.04, 0.033, 0.018],
+    [0.072, 0.038, 0.017, 0.003],
+    [0.102, 0.037, 0.0155, 0.009],
+    [0.132, 0.033, 0.0135, 0.018],
+    [0.156, 0.026, 0.0105, 0.028],
+    [0.171, 0.014, 0.0065, 0.034],
+    [0.175, 0, 0, 0.036],
+  ],
+  14,
+).geometry;
+const THUMB = solid(
+  [
+    [0, 0.013, 0.013],
+    [0.02, 0.0155, 0.014],
+    [0.045, 0.0125, 0.012],
+    [0.062, 0.011, 0.01],
+    [0.072, 0.006, 0.006],
+    [0.075, 0, 0],
+  ],
+  10,
+)
+  .geometry.rotateZ(-0.62)
+  .translate(0.016, 0.018, 0.006);
+/** The ankle is so high over the sole, and its way to the ball of the foot goes down by so many radians. */
+const [SOLE, SLOPE] = [0.078, Math.atan2(0.06, 0.13)];
+const FOOT = foot();
+/** The way from neck to head leans ahead by so much where somebody looks ahead. */
+const NOD = Math.atan2(0.052, 0.089);
+const SKULL = shaped(new THREE.SphereGeometry(1, 24, 18), 0);
+const FACE = shaped(
+  new THREE.SphereGeometry(1, 32, 24, Math.PI * 0.1, Math.PI * 0.8, Math.PI * 0.15, Math.PI * 0.75),
+  1,
+);
 
 export class Mannequin {
   readonly group = new THREE.Group();
-  /** Where the joints are. */
-  readonly joints: THREE.Vector3[] = Array.from({ length: 22 }, () => new THREE.Vector3());
+  private readonly joints = Array.from({ length: 22 }, () => new THREE.Vector3());
   private readonly wood: THREE.MeshStandardMaterial;
   private readonly dark: THREE.MeshStandardMaterial;
-  private readonly parts: Part[];
+  private readonly torso = new Loft(TORSO.length, 28);
+  private readonly yoke = new Loft(YOKE.length, 14);
+  private readonly limbs = SIDES.map(() => ({ arm: new Loft(ARM.length, 14), leg: new Loft(LEG.length, 20) }));
+  private readonly head = new THREE.Group();
+  private readonly hands = SIDES.map(() => new THREE.Group());
+  private readonly feet: THREE.Mesh[];
 
   constructor(look: FigureLook) {
     this.wood = material(look.body, look);
     this.dark = material(look.joints, look);
-    this.parts = [
-      ...LIMBS.map(([from, to, near, far]) => this.limb(from, to, near, far)),
-      ...BALLS.map(([joint, radius]) => this.ball(joint, radius)),
-      ...this.torso(),
-      this.head(),
-      this.nose(),
-      ...SIDES.map(({ elbow, wrist }) => this.hand(elbow, wrist)),
-      ...SIDES.map(({ knee, ankle, foot }) => this.foot(knee, ankle, foot)),
-    ];
-    for (const { mesh } of this.parts) {
-      mesh.castShadow = look.opacity === 1;
-      mesh.receiveShadow = look.opacity === 1;
-      this.group.add(mesh);
-    }
+    this.group.add(...this.bent().map((geometry) => new THREE.Mesh(geometry, this.wood)));
+    this.head.add(new THREE.Mesh(SKULL, this.wood), new THREE.Mesh(FACE, this.dark));
+    for (const hand of this.hands) hand.add(new THREE.Mesh(HAND, this.wood), new THREE.Mesh(THUMB, this.wood));
+    this.hands[0]!.scale.z = -1; // the palm of a left hand is on the other side
+    this.feet = SIDES.map(() => new THREE.Mesh(FOOT, this.dark));
+    this.group.add(this.head, ...this.hands, ...this.feet);
+    this.group.traverse((one) => (one.frustumCulled = false));
+    this.look(look);
   }
 
   look(look: FigureLook): void {
@@ -79,181 +160,126 @@ export class Mannequin {
       one.transparent = look.opacity < 1;
       one.depthWrite = look.opacity > 0.4;
     }
-    for (const { mesh } of this.parts) mesh.castShadow = mesh.receiveShadow = look.opacity === 1;
+    this.group.traverse((one) => (one.castShadow = one.receiveShadow = look.opacity === 1));
   }
 
   /** Put every joint at its place of (22 * 3) numbers. */
   pose(positions: ArrayLike<number>): void {
-    this.joints.forEach((joint, n) => joint.set(positions[n * 3]!, positions[n * 3 + 1]!, positions[n * 3 + 2]!));
-    const frame = frameOf(this.joints);
-    for (const part of this.parts) part.place(this.joints, frame);
+    const { joints: j } = this;
+    j.forEach((joint, n) => joint.set(positions[n * 3]!, positions[n * 3 + 1]!, positions[n * 3 + 2]!));
+    const hips = from(j[RIGHT.hip]!, j[LEFT.hip]!).normalize();
+    const chest = from(j[RIGHT.collar]!, j[LEFT.collar]!).normalize();
+    chest.add(from(j[RIGHT.shoulder]!, j[LEFT.shoulder]!).normalize()).normalize();
+    const over = (stations: readonly Station[], side: (ring: number) => THREE.Vector3) =>
+      stations.map(([a, b, part, wide, deep = wide, ahead = 0], ring) => {
+        return { at: j[a]!.clone().lerp(j[b]!, part), side: side(ring), wide, deep, ahead };
+      });
+    const spine = from(j[SPINE3]!, j[NECK]!);
+    this.torso.over(over(TORSO, (ring) => hips.clone().lerp(chest, Math.min(ring / 9, 1))));
+    this.yoke.over(over(YOKE, () => spine));
+    const up = from(j[NECK]!, j[HEAD]!).applyAxisAngle(chest, -NOD).normalize();
+    turn(this.head, j[HEAD]!, chest, up);
+    this.head.translateY(0.075).translateZ(0.006);
+    SIDES.forEach((side, n) => {
+      const { arm, leg } = this.limbs[n]!;
+      const [thigh, shin] = [from(j[side.hip]!, j[side.knee]!), from(j[side.knee]!, j[side.ankle]!)];
+      const [upper, fore] = [from(j[side.shoulder]!, j[side.elbow]!), from(j[side.elbow]!, j[side.wrist]!)];
+      // What bends says where its front is; what is straight takes it from hips and shoulders.
+      const knee = shin.clone().cross(thigh).multiplyScalar(12).addScaledVector(hips, -0.5);
+      const elbow = upper.clone().cross(fore).multiplyScalar(12).addScaledVector(chest, -0.25);
+      leg.over(this.limb(LEG, side, knee));
+      arm.over(this.limb(ARM, side, elbow));
+      turn(this.hands[n]!, j[side.wrist]!, elbow.clone().cross(fore), fore);
+      const along = from(j[side.ankle]!, j[side.foot]!);
+      const across = along.clone().cross(shin);
+      turn(this.feet[n]!, j[side.ankle]!, across.lengthSq() > 1e-8 ? across : hips, along.clone().cross(across));
+    });
   }
 
   dispose(): void {
-    for (const { mesh } of this.parts) if (mesh.geometry !== BALL && mesh.geometry !== SMALL) mesh.geometry.dispose();
+    for (const geometry of this.bent()) geometry.dispose();
     this.wood.dispose();
     this.dark.dispose();
   }
 
-  private limb(from: number, to: number, near: number, far: number): Part {
-    const mesh = new THREE.Mesh(taper(near, far), this.wood);
-    return { mesh, place: (joints) => between(mesh, joints[from]!, joints[to]!) };
+  private bent(): THREE.BufferGeometry[] {
+    return [this.torso, this.yoke, ...this.limbs.flatMap(({ arm, leg }) => [arm, leg])].map((one) => one.geometry);
   }
 
-  private ball(joint: number, radius: number): Part {
-    const mesh = new THREE.Mesh(SMALL, this.dark);
-    mesh.scale.setScalar(radius);
-    return { mesh, place: (joints) => mesh.position.copy(joints[joint]!) };
+  /** The rings of a limb, with its bends made round. */
+  private limb(stations: typeof LEG, joints: Side, side: THREE.Vector3): Ring[] {
+    const places = stations.map(([a, b, part]) => this.joints[joints[a]]!.clone().lerp(this.joints[joints[b]]!, part));
+    return stations.map(([, , , wide, ahead], n) => {
+      const [before, at, behind] = [places[n - 1], places[n]!, places[n + 1]];
+      const round = before && behind ? at.clone().multiplyScalar(2).add(before).add(behind).multiplyScalar(0.25) : at;
+      return { at: round, side, wide, deep: wide, ahead };
+    });
   }
+}
 
-  /** Pelvis, waist and chest: ellipsoids that turn with hips and shoulders. */
-  private torso(): Part[] {
-    const pelvis = new THREE.Mesh(BALL, this.wood);
-    const waist = new THREE.Mesh(BALL, this.wood);
-    const belly = new THREE.Mesh(BALL, this.wood);
-    const chest = new THREE.Mesh(BALL, this.wood);
-    const middle = new THREE.Vector3();
-    return [
-      {
-        mesh: pelvis,
-        place: (j, f) =>
-          ellipsoid(
-            pelvis,
-            middle.lerpVectors(j[PELVIS]!, j[LEFT.hip]!.clone().add(j[RIGHT.hip]!).multiplyScalar(0.5), 0.35),
-            f.hips,
-            f.pelvisUp,
-            [0.15, 0.115, 0.112],
-          ),
-      },
-      {
-        mesh: waist,
-        place: (j, f) =>
-          ellipsoid(waist, middle.lerpVectors(j[SPINE1]!, j[SPINE2]!, 0.1), f.hips, f.pelvisUp, [0.12, 0.105, 0.092]),
-      },
-      { mesh: belly, place: (j, f) => ellipsoid(belly, j[SPINE2]!, f.chest, f.chestUp, [0.132, 0.125, 0.1]) },
-      {
-        mesh: chest,
-        place: (j, f) =>
-          ellipsoid(chest, middle.lerpVectors(j[SPINE3]!, j[NECK]!, 0.3), f.chest, f.chestUp, [0.162, 0.165, 0.112]),
-      },
-    ];
-  }
+function from(a: THREE.Vector3, b: THREE.Vector3): THREE.Vector3 {
+  return b.clone().sub(a);
+}
 
-  private head(): Part {
-    const mesh = new THREE.Mesh(BALL, this.wood);
-    const centre = new THREE.Vector3();
-    return {
-      mesh,
-      place: (joints, frame) => {
-        const up = centre.copy(joints[HEAD]!).sub(joints[NECK]!).normalize().clone();
-        centre.copy(joints[HEAD]!).addScaledVector(up, 0.07).addScaledVector(frame.face, 0.02);
-        ellipsoid(mesh, centre, frame.chest, up, [0.083, 0.118, 0.1]);
-      },
-    };
-  }
+/** Put something at a place, with its +Y along `up` and its +X as near to `side` as that allows. */
+function turn(what: THREE.Object3D, at: THREE.Vector3, side: THREE.Vector3, up: THREE.Vector3): void {
+  const y = up.clone().normalize();
+  const x = side.clone().addScaledVector(y, -side.dot(y)).normalize();
+  what.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(x, y, x.clone().cross(y)));
+  what.position.copy(at);
+}
 
-  /** Which way somebody looks. */
-  private nose(): Part {
-    const mesh = new THREE.Mesh(SMALL, this.dark);
-    return {
-      mesh,
-      place: (joints, frame) => {
-        const up = joints[HEAD]!.clone().sub(joints[NECK]!).normalize();
-        const at = joints[HEAD]!.clone().addScaledVector(up, 0.075).addScaledVector(frame.face, 0.112);
-        ellipsoid(mesh, at, frame.chest, up, [0.05, 0.014, 0.014]);
-      },
-    };
-  }
+/** A shoe from the ankle: its sole lies flat where the way to the ball of the foot goes down as it does at rest. */
+function foot(): THREE.BufferGeometry {
+  const rings = [
+    [-0.085, 0, 0.04],
+    [-0.081, 0.018, 0.05],
+    [-0.066, 0.031, 0.078],
+    [-0.035, 0.037, 0.112],
+    [0.005, 0.039, 0.118],
+    [0.042, 0.04, 0.097],
+    [0.085, 0.044, 0.066],
+    [0.125, 0.048, 0.052],
+    [0.16, 0.046, 0.045],
+    [0.185, 0.036, 0.038],
+    [0.2, 0.02, 0.03],
+    [0.205, 0, 0.02],
+  ] as const;
+  const side = new THREE.Vector3(-1, 0, 0);
+  const shoe = new Loft(rings.length, 16).over(
+    rings.map(([z, wide, high]) => ({
+      at: new THREE.Vector3(0, high / 2 - SOLE, z),
+      side,
+      wide,
+      deep: wide && high * 0.5 + 0.008,
+    })),
+    -SOLE,
+  );
+  return shoe.geometry.rotateX(-SLOPE);
+}
 
-  private hand(elbow: number, wrist: number): Part {
-    const mesh = new THREE.Mesh(SMALL, this.wood);
-    return {
-      mesh,
-      place: (joints, frame) => {
-        const along = joints[wrist]!.clone().sub(joints[elbow]!).normalize();
-        ellipsoid(mesh, joints[wrist]!.clone().addScaledVector(along, 0.075), frame.face, along, [0.038, 0.082, 0.022]);
-      },
-    };
+/** A ball as a head: a narrow jaw and a flat front; `lift` 1: the face on it, with brow and nose. */
+function shaped(ball: THREE.BufferGeometry, lift: number): THREE.BufferGeometry {
+  const places = ball.getAttribute("position");
+  for (let n = 0; n < places.count; n += 1) {
+    const [x, y, z] = [places.getX(n), places.getY(n), places.getZ(n)];
+    const [jaw, front] = [Math.max(-y, 0), Math.max(z, 0)];
+    const nose = Math.exp(-((x / 0.2) ** 2) - ((y + 0.14) / 0.24) ** 2);
+    const brow = Math.exp(-((x / 0.75) ** 2) - ((y - 0.3) / 0.12) ** 2);
+    // Outside of an oval the face is below the skull.
+    const oval = 1 - (x / 0.74) ** 2 - ((y + 0.08) / 0.78) ** 2;
+    const out = lift * (0.03 * Math.min(oval, 0.16) + front * (0.015 * nose + 0.004 * brow));
+    places.setXYZ(
+      n,
+      x * 0.077 * (1 - 0.3 * jaw ** 1.5),
+      y * (y > 0 ? 0.108 : 0.112),
+      (z > 0 ? 0.09 * z ** 0.75 : 0.1 * z) + 0.012 * jaw * front + out,
+    );
   }
-
-  private foot(knee: number, ankle: number, toe: number): Part {
-    const mesh = new THREE.Mesh(BALL, this.wood);
-    return {
-      mesh,
-      place: (joints) => {
-        const along = joints[toe]!.clone().sub(joints[ankle]!);
-        const shin = joints[knee]!.clone().sub(joints[ankle]!);
-        const side = along.clone().cross(shin);
-        const middle = joints[ankle]!.clone().lerp(joints[toe]!, 0.62);
-        ellipsoid(
-          mesh,
-          middle,
-          side.lengthSq() > 1e-8 ? side : new THREE.Vector3(1, 0, 0),
-          along,
-          [0.045, 0.13, 0.036],
-        );
-      },
-    };
-  }
+  ball.computeVertexNormals();
+  return ball;
 }
 
 function material(color: string, look: FigureLook): THREE.MeshStandardMaterial {
-  return new THREE.MeshStandardMaterial({
-    color,
-    roughness: 0.62,
-    metalness: 0,
-    transparent: look.opacity < 1,
-    opacity: look.opacity,
-    depthWrite: look.opacity > 0.4,
-  });
-}
-
-function frameOf(j: readonly THREE.Vector3[]): Frame {
-  const hips = j[LEFT.hip]!.clone().sub(j[RIGHT.hip]!).normalize();
-  const chest = j[LEFT.shoulder]!.clone().sub(j[RIGHT.shoulder]!).normalize();
-  const chestUp = j[NECK]!.clone().sub(j[SPINE2]!).normalize();
-  const pelvisUp = j[SPINE2]!.clone().sub(j[PELVIS]!).normalize();
-  const headUp = j[HEAD]!.clone().sub(j[NECK]!).normalize();
-  const collars = j[LEFT.collar]!.clone().sub(j[RIGHT.collar]!).normalize().add(chest).normalize();
-  return { hips, chest, chestUp, pelvisUp, face: collars.cross(headUp).normalize() };
-}
-
-/** Rings of each round end. */
-const RINGS = 4;
-
-/** A capsule of length 1 from the origin along +Y, thinner towards its end. */
-function taper(near: number, far: number): THREE.BufferGeometry {
-  const points: THREE.Vector2[] = [];
-  for (let n = 0; n <= RINGS; n += 1) points.push(cap(near, 0, -Math.PI / 2 + (n / RINGS) * (Math.PI / 2)));
-  for (let n = 0; n <= RINGS; n += 1) points.push(cap(far, 1, (n / RINGS) * (Math.PI / 2)));
-  return new THREE.LatheGeometry(points, 18);
-}
-
-function cap(radius: number, height: number, angle: number): THREE.Vector2 {
-  // The limb is stretched to its length, some 0.35 m, so its round ends are drawn longer by as much.
-  return new THREE.Vector2(Math.max(Math.cos(angle) * radius, 1e-4), height + Math.sin(angle) * radius * 2.5);
-}
-
-function between(mesh: THREE.Mesh, from: THREE.Vector3, to: THREE.Vector3): void {
-  const way = to.clone().sub(from);
-  const size = Math.max(way.length(), 1e-4);
-  mesh.position.copy(from);
-  mesh.quaternion.setFromUnitVectors(UP, way.divideScalar(size));
-  mesh.scale.set(1, size, 1);
-}
-
-/** Radii along `side`, `up` and what is square to both. */
-function ellipsoid(
-  mesh: THREE.Mesh,
-  at: THREE.Vector3,
-  side: THREE.Vector3,
-  up: THREE.Vector3,
-  radii: readonly [number, number, number],
-): void {
-  const y = up.clone().normalize();
-  const x = side.clone().addScaledVector(y, -side.dot(y)).normalize();
-  const z = x.clone().cross(y);
-  mesh.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(x, y, z));
-  mesh.position.copy(at);
-  mesh.scale.set(...radii);
+  return new THREE.MeshStandardMaterial({ color, roughness: 0.62, metalness: 0, opacity: look.opacity });
 }

@@ -2,8 +2,12 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { type Backdrop, NONE, cover, textureOf } from "./backdrop";
 import { Floor } from "./floor";
 import type { StageTheme } from "./theme";
+
+/** The layer of what is there to be dragged, which no film shows. */
+export const HANDLES = 1;
 
 /** Frames slower than this for a while make the picture coarser. */
 const SLOW = 45;
@@ -36,6 +40,14 @@ export class Scene {
   private isCoarse = false;
   private next = 0;
   private lifted = 0;
+  private theme: StageTheme;
+  private backdrop = NONE;
+  private picture: THREE.Texture | null = null;
+  /** The colour behind everything. */
+  readonly color = new THREE.Color();
+  private besides = 0;
+  /** While pictures of a film are drawn: their size. */
+  private filmed: readonly [number, number] | null = null;
   private readonly sizes = new ResizeObserver(() => this.resize());
 
   /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp a second later. */
@@ -51,6 +63,7 @@ export class Scene {
     readonly canvas: HTMLCanvasElement,
     theme: StageTheme,
   ) {
+    this.theme = theme;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(this.fine);
     this.renderer.shadowMap.enabled = true;
@@ -61,6 +74,7 @@ export class Scene {
     this.sun = sunlight();
     this.scene.add(this.floor.group, this.sky, this.sun, this.sun.target);
     this.camera.position.set(2.5, 1.65, 3.5);
+    this.camera.layers.enable(HANDLES);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.target.set(0, 0.86, 0);
     this.orbit.enableDamping = true;
@@ -92,20 +106,38 @@ export class Scene {
     this.resize();
   }
 
+  /** Show the middle of the picture in the middle of what is left beside this part of its width at the right. */
+  aside(part: number): void {
+    if (part === this.besides) return;
+    this.besides = part;
+    this.resize();
+  }
+
   invalidate(): void {
     this.dirty = true;
   }
 
   look(theme: StageTheme): void {
-    this.scene.background = new THREE.Color(theme.background);
-    this.renderer.setClearColor(theme.background);
-    this.scene.fog = new THREE.Fog(theme.background, 14, 34);
+    this.theme = theme;
+    this.color.set(this.backdrop.color ?? theme.background);
+    this.scene.background = this.picture ?? this.color;
+    this.renderer.setClearColor(this.color);
+    this.scene.fog = this.picture ? null : new THREE.Fog(this.color, 14, 34);
     this.sky.color.set(theme.sky);
     this.sky.groundColor.set(theme.ground);
     this.sky.intensity = theme.fill;
     this.sun.intensity = theme.sun;
     this.floor.look(theme);
     this.invalidate();
+  }
+
+  /** Show a colour or a picture behind everything. */
+  async behind(backdrop: Backdrop): Promise<void> {
+    const picture = backdrop.picture === null ? null : await textureOf(backdrop.picture);
+    this.picture?.dispose();
+    [this.backdrop, this.picture] = [backdrop, picture];
+    this.look(this.theme);
+    this.resize();
   }
 
   /** Light and orbit go where the people are. */
@@ -163,8 +195,37 @@ export class Scene {
     return ray;
   }
 
+  /** Draw the pictures of a film, of this size, and none for the page until it has ended (null). */
+  film(size: readonly [number, number] | null): void {
+    this.filmed = size;
+    if (size) this.camera.layers.disable(HANDLES);
+    else this.camera.layers.enable(HANDLES);
+    this.renderer.setPixelRatio(size ? 1 : this.fine);
+    this.resize();
+  }
+
+  /** The picture as it is now. */
+  shot(): Promise<Blob> {
+    this.camera.lookAt(this.orbit.target);
+    this.draw();
+    return new Promise((done, fail) =>
+      this.canvas.toBlob(
+        (blob) =>
+          blob ? done(blob) : fail(new Error("this browser could not draw a picture of that size; choose another.")),
+        "image/jpeg",
+        0.95,
+      ),
+    );
+  }
+
+  private draw(): void {
+    if (this.paint) this.paint();
+    else this.renderer.render(this.scene, this.camera);
+  }
+
   private frame(now: number): void {
     this.next = requestAnimationFrame((next) => this.frame(next));
+    if (this.filmed) return;
     const elapsed = Math.min(now - this.last, 250);
     this.last = now;
     const moved = this.step(elapsed);
@@ -178,8 +239,7 @@ export class Scene {
     this.isCoarse = changed && this.coarse < this.fine && (now - this.drawn < REST || this.busy());
     this.sharpness(this.isCoarse ? this.coarse : this.fine);
     if (changed) this.drawn = now;
-    if (this.paint) this.paint();
-    else this.renderer.render(this.scene, this.camera);
+    this.draw();
     this.painted();
     if (changed) this.adapt(elapsed);
   }
@@ -196,6 +256,7 @@ export class Scene {
     this.coarse = ratio;
     this.sun.shadow.mapSize.set(512, 512);
     this.sun.shadow.normalBias = COARSE_BIAS;
+    this.sun.shadow.radius = 2.5;
     this.sun.shadow.map?.dispose();
     this.sun.shadow.map = null;
   }
@@ -209,10 +270,13 @@ export class Scene {
 
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas.parentElement!;
-    if (!clientWidth || !clientHeight) return;
-    this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
-    if (this.lifted) this.camera.setViewOffset(clientWidth, clientHeight, 0, this.lifted, clientWidth, clientHeight);
+    const [width, height] = this.filmed ?? [clientWidth, clientHeight];
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    if (this.picture) cover(this.picture, width / height);
+    const [right, up] = this.filmed ? [0, 0] : [(this.besides * width) / 2, this.lifted];
+    if (right || up) this.camera.setViewOffset(width, height, right, up, width, height);
     else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.invalidate();

@@ -7,12 +7,16 @@ import type { Ground } from "../project/path";
 import { GazeTool } from "./gazeTool";
 import { Cast, type Ghost } from "./cast";
 import { Character } from "./character";
+import { FOLLOWING } from "./filming";
+import { MeetingTool } from "./meetingTool";
 import { PathTool, ring } from "./pathTool";
 import { Said } from "./said";
 import { Scene } from "./scene";
+import { Steps } from "./steps";
 import { TargetTool } from "./targetTool";
 import { DARK, GHOSTS, LIGHT, type StageTheme } from "./theme";
 import { Trails } from "./trails";
+import { SplitView } from "./views";
 
 /** Pixels that the pointer may move in a click. */
 const CLICKED = 5;
@@ -24,9 +28,12 @@ export class Stage {
   readonly scene: Scene;
   readonly path: PathTool;
   readonly targets: TargetTool;
+  readonly meetings: MeetingTool;
   private readonly cast: Cast;
   private readonly trails: Trails;
   private readonly character: Character;
+  private readonly views: SplitView;
+  private readonly steps: Steps;
   /** Where somebody is sent in live mode. */
   private readonly goal: THREE.Mesh;
   /** Called in live mode with the place on the floor that was clicked. */
@@ -43,8 +50,11 @@ export class Stage {
     this.gaze = new GazeTool(app, this.scene, theme);
     this.trails = new Trails(this.scene.scene, theme);
     this.character = new Character(app, this.scene);
+    this.views = new SplitView(this.scene);
+    this.steps = new Steps(this.scene.scene, theme);
     this.path = new PathTool(app, this.scene, theme);
     this.targets = new TargetTool(app, this.scene, this.cast, theme);
+    this.meetings = new MeetingTool(app, this.scene, theme);
     this.goal = ring(0.16, theme.path[0]);
     this.goal.visible = false;
     this.scene.scene.add(this.goal);
@@ -55,6 +65,7 @@ export class Stage {
       this.gaze.tell();
       this.path.tell();
       this.targets.tell();
+      this.meetings.tell();
       said.tell();
     };
     this.listen(canvas);
@@ -64,6 +75,7 @@ export class Stage {
     app.live.subscribe((live) => {
       this.goal.visible = Boolean(live?.goal);
       if (live?.goal) this.goal.position.set(live.goal.x, 0.012, live.goal.z);
+      this.steps.show(live ? null : shownClip(app));
       this.scene.invalidate();
     });
   }
@@ -74,8 +86,10 @@ export class Stage {
     this.cast.look(theme);
     this.gaze.look(theme);
     this.trails.look(theme);
+    this.steps.look(theme);
     this.path.look(theme);
     this.targets.look(theme);
+    this.meetings.look(theme);
     this.place();
   }
 
@@ -129,6 +143,7 @@ export class Stage {
       "around",
       "trails",
       "sideBySide",
+      "views",
       "fan",
       "playing",
     ] as const;
@@ -137,7 +152,10 @@ export class Stage {
   }
 
   private update(): void {
-    this.trails.show(this.app.session.value.trails ? shownClip(this.app) : null);
+    const { trails, sideBySide, fan } = this.app.session.value;
+    this.trails.show(trails ? shownClip(this.app) : null);
+    this.steps.show(sideBySide || fan || this.app.live.value ? null : shownClip(this.app));
+    this.scene.canvas.dataset.steps = String(this.steps.count);
     this.path.update();
     this.character.update();
     this.place();
@@ -146,6 +164,7 @@ export class Stage {
   /** Everybody where they are at the playhead. */
   private place(): void {
     const { time, fan, sideBySide } = this.app.session.value;
+    const views = sideBySide ? null : this.app.session.value.views;
     const drawn = denoised(this.app);
     const clip = drawn ?? shownClip(this.app);
     const isFuture = fan !== null && time > fan.past;
@@ -156,7 +175,10 @@ export class Stage {
     this.gaze.update();
     this.path.at(time);
     this.targets.update();
-    this.scene.paint = this.app.session.value.sideBySide ? () => this.paintTakes() : null;
+    this.meetings.update();
+    this.views.show(views);
+    const people = clip?.people.map((_, person) => jointAt(clip, person, 0, time)) ?? [[0, 1, 0] as const];
+    this.scene.paint = sideBySide ? () => this.paintTakes() : views && (() => this.views.paint(views, people));
     this.scene.invalidate();
   }
 
@@ -196,7 +218,7 @@ export class Stage {
         x,
         z,
         follow && session.value.tool !== "path" && !this.targets.busy,
-        1 - Math.exp(-elapsed / 220),
+        1 - Math.exp(-elapsed / FOLLOWING),
       );
       if (before.distanceToSquared(this.scene.orbit.target) > 1e-7) return true;
     }
@@ -241,6 +263,7 @@ export class Stage {
 
   private listen(canvas: HTMLCanvasElement): void {
     let held = false;
+    let holder: PathTool | MeetingTool = this.path;
     let pressed: [number, number] = [0, 0];
     // In the capture phase, before the orbit hears of it.
     canvas.addEventListener(
@@ -249,7 +272,8 @@ export class Stage {
         pressed = [event.clientX, event.clientY];
         if (this.app.live.value) return;
         if (this.app.session.value.sideBySide) return this.keepUnder(event);
-        held = this.path.press(event);
+        holder = this.meetings.press(event) ? this.meetings : this.path;
+        held = holder === this.meetings || this.path.press(event);
         if (held) {
           this.scene.orbit.enabled = false;
           canvas.setPointerCapture(event.pointerId);
@@ -257,12 +281,12 @@ export class Stage {
       },
       true,
     );
-    canvas.addEventListener("pointermove", (event) => held && this.path.move(event));
+    canvas.addEventListener("pointermove", (event) => held && holder.move(event));
     const end = (event: PointerEvent) => {
       if (!held) return;
       held = false;
       this.scene.orbit.enabled = true;
-      this.path.release(event);
+      holder.release(event);
     };
     canvas.addEventListener("pointerup", end);
     canvas.addEventListener("pointercancel", end);

@@ -11,6 +11,7 @@ export interface StageTheme {
   readonly line: string;
   readonly strong: string;
   readonly label: string;
+  readonly steps: string;
   readonly shadow: number;
   readonly sky: string;
   readonly ground: string;
@@ -27,6 +28,7 @@ export const LIGHT: StageTheme = {
   line: "#cfccc4",
   strong: "#b3afa5",
   label: "#7c786e",
+  steps: "#b3afa5",
   shadow: 0.26,
   sky: "#ffffff",
   ground: "#c9c2b4",
@@ -46,6 +48,7 @@ export const DARK: StageTheme = {
   line: "#2c2f35",
   strong: "#3f434b",
   label: "#868c97",
+  steps: "#7b818c",
   shadow: 0.5,
   sky: "#cfd8e6",
   ground: "#35322e",

@@ -243,6 +243,27 @@ def test_a_switch_has_both_motions_and_what_is_between(server: Server, walk: str
     assert made["frames"] == 40 + 10 + 40
 
 
+@pytest.mark.parametrize("blocks", [1, 2])
+def test_goals_of_both_people_of_a_duet_are_kept(server: Server, blocks: int) -> None:
+    """Right wrists meet at one place, in words alone and in a timeline."""
+    place, seconds = np.array([0.1, 1.2, 0.38]), 4.0
+
+    def goal(z: float, facing: float, apart: float) -> dict[str, Any]:
+        at = (place + np.array([0.0, 0.0, apart])).tolist()
+        path = {"points": [[0, z], [0, z]], "times": [0, seconds], "facing": [facing, facing]}
+        return {"path": path, "joints": [{"joint": "right_wrist", "points": [{"time": 1.5, "position": at}]}]}
+
+    first, second = goal(0.0, 0.0, -0.02), goal(0.75, 180.0, 0.02)
+    asked: dict[str, Any] = {"prompt": "two people shake hands", "seconds": seconds, "goals": first}
+    if blocks == 2:
+        segments = [{"text": "two people shake hands", "seconds": seconds / 2}] * 2
+        asked = {"timeline": {"segments": segments, "path": first}}
+    (result,) = server.draw(task="duet", steps=8, other_goals=second, **asked)["results"]
+    _, found = server.json("GET", f"/motions/{result['id']}")
+    wrists = [decoded(one["positions"], -1, 22, 3)[30, 21] for one in found["people"]]
+    assert [float(np.linalg.norm(wrist - place)) for wrist in wrists] == pytest.approx([0.02, 0.02], abs=0.05)
+
+
 def test_a_duet_has_two_people_and_one_answers_somebody(server: Server, walk: str) -> None:
     (two,) = server.draw(task="duet", prompt="two people dance", seconds=2.0, steps=4)["results"]
     first, second = (poses(server, two["id"], person) for person in (0, 1))
@@ -312,6 +333,7 @@ BROKEN: list[tuple[Any, str]] = [
     ({"task": "edit", "motion": "../../../etc/passwd"}, "no such motion"),
     ({"task": "edit", "motion": "0" * 16}, "there is no motion"),
     ({"task": "duet", "prompt": "a", "react_to": "0" * 16, "past": "0" * 16}, "different duets"),
+    ({"task": "duet", "prompt": "a", "other_goals": {}}, "'other_goals' go with words or a timeline, and with goals"),
 ]
 
 

@@ -37,3 +37,29 @@ def test_a_second_person_answers_a_clip(studio: Studio):
     assert np.abs(motion[0] - alone[0]).max() < 1e-3
     apart = np.linalg.norm(motion[1, :, 0] - motion[0, :, 0], axis=-1)
     assert apart.mean() > 0.3, apart.mean()  # somebody else, somewhere else
+
+
+def test_where_hands_meet_is_dragged_for_both_people(studio: Studio):
+    page = studio.page
+    studio.open(("two people shake hands", 4.0), people=2, seed=4)
+    page.wait_for_selector("#canvas[data-meetings]:not([data-meetings='0'])")
+    studio.key("Shift+T")
+    x, y = studio.at("meeting")
+    studio.drag((x, y), (x + 6, y - 30))
+    project = studio.project()
+    first, second = (person["targets"] for person in project["people"])
+    assert (len(first), len(second)) == (1, 1)
+    assert first[0]["time"] == second[0]["time"]
+    assert all(person["path"] for person in project["people"]), "both go as they went"
+    motion = studio.motion(project)
+    frame = round(first[0]["time"] * 20) + 1
+    wrists = [motion[who, frame, one[0]["joint"]] for who, one in enumerate((first, second))]
+    off = [np.linalg.norm(wrist - one[0]["position"]) for wrist, one in zip(wrists, (first, second), strict=True)]
+    assert max(off) < 0.05, off
+    assert np.linalg.norm(wrists[0] - wrists[1]) < 0.12
+    studio.key("PageUp")
+    higher = studio.project()["people"]
+    for now, one in zip(higher, (first, second), strict=True):
+        assert abs(now["targets"][0]["position"][1] - one[0]["position"][1] - 0.05) < 0.002
+    studio.key("Control+z", "Control+z")
+    assert not any(person["targets"] for person in studio.project()["people"])

@@ -266,6 +266,12 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     off = np.linalg.norm((made[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
     assert off.mean() < 0.03
     assert abs(heading(made[1].positions()[:1])[0] - np.pi / 2) < 0.5
+    other = replace(path, positions=path.positions + np.array([0.0, 0.0, 1.0]))
+    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, other=other, steps=3, foot_lock=False)))
+    for one, asked in zip(made, (other, path), strict=True):
+        assert np.linalg.norm((one.root - asked.positions[:, 0])[:, [0, 2]], axis=-1).mean() < 0.03
+    with pytest.raises(MotionloomError, match="give both"):
+        list(compose_pair(prior, block, SEGMENTS, other=other, steps=3))
 
 
 def test_guesses_go_where_their_person_is_asked_to_be(

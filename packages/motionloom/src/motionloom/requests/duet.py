@@ -17,6 +17,7 @@ class Duet(Finish, Adapted):
     past: Any = declare("motion", "a motion of two people that both go on from")
     react_to: Any = declare("motion", "a motion of the first person, whom the second answers")
     goals: Any = declare("goals", "what a goal file holds, for one of the two")
+    other_goals: Any = declare("goals", "the same for the other of the two; with words or a timeline, and goals")
     person: int = declare("whole", "whose the goals are, counted from 0", 0, low=0, high=7)
     seconds: float | None = seconds("length: 6, or what a past gets: 3")
     seed: int | None = like(

@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
-from starlette.routing import BaseRoute, Route
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
@@ -25,6 +25,7 @@ from motionloom.requests.reading import read, typed
 from motionloom.retarget.named import NAMED
 from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
+from motionloom.server.films import film
 from motionloom.server.guard import Door, Guard
 from motionloom.server.job_request import TASKS, read_request
 from motionloom.server.limits import Limits
@@ -100,6 +101,7 @@ def routes(*, page: bool = True) -> list[BaseRoute]:
         Route("/motions/{id}/deeds", deeds),
         Route("/characters", upload_character, methods=["POST"]),
         Route("/characters/{id}", character),
+        WebSocketRoute("/film", film),
         *project_routes(),
         Route("/timeline.yaml", timeline_to_yaml, methods=["POST"]),
         Route("/timeline.json", timeline_to_json, methods=["POST"]),

@@ -37,7 +37,9 @@ def draw(models: Models, request: JobRequest, progress: Progress) -> Iterator[Re
 def plan_of(request: JobRequest) -> Plan:
     """What is asked, with the motions that it names."""
     timeline, values = request.timeline, request.values
-    goals = (request.goal, None) if request.task != "duet" or values.person == 0 else (None, request.goal)
+    goals = (request.goal, request.other_goal)
+    if request.task == "duet" and values.person == 1:
+        goals = (request.other_goal, request.goal)
     people = list(request.motion.people) if request.motion else []
     if request.task == "predict" or getattr(values, "react_to", None) is not None:
         people = [people[values.person]]

@@ -49,6 +49,8 @@ class JobRequest:
     timeline: Timeline | None = None
     goal: "Goal | None" = None
     """In the world."""
+    other_goal: "Goal | None" = None
+    """Of the other of two people."""
     parts: "tuple[tuple[str, Goal], ...]" = ()
     """The goal item by item, each with its name, such as ``joints[0]``."""
     motion: Stored | None = None
@@ -186,8 +188,12 @@ class _Reader:
             raise MotionloomError(f"the two people are 0 and 1; there is no person {values.person}")
         if "goals" in self.given and kinds:
             raise MotionloomError(f"'goals' do not go with '{kinds[0]}'; a timeline has a 'path' of its own")
+        if "other_goals" in self.given and (kinds not in ([], ["timeline"]) or not self.asked()):
+            raise MotionloomError("'other_goals' go with words or a timeline, and with goals of the first person")
         if kinds == ["timeline"]:
-            return self.compose(found)
+            found = self.compose(found)
+            assert found.timeline is not None
+            return replace(found, other_goal=self.other_goal(found.timeline.frames))
         found = replace(found, sampling=settled(values))
         if kinds == ["react_to"]:
             if values.seconds is not None:
@@ -245,7 +251,23 @@ class _Reader:
         if not isinstance(value, Mapping):
             Field(value, "goals").wrong("a mapping, as a goal file holds it")
         goal = read_goal(value, frames=frames, folder=self.project.motions)
-        return replace(found, seconds=seconds, goal=goal, parts=self.parts(frames))
+        return replace(found, seconds=seconds, goal=goal, parts=self.parts(frames), other_goal=self.other_goal(frames))
+
+    def asked(self) -> bool:
+        """Whether anything is asked of the person of a duet."""
+        timeline = self.given.get("timeline")
+        return "goals" in self.given or (isinstance(timeline, Mapping) and "path" in timeline)
+
+    def other_goal(self, frames: int) -> "Goal | None":
+        """What the other of two people is asked."""
+        from motionloom.goals.goal_file import read_goal
+
+        if "other_goals" not in self.given:
+            return None
+        value = self.given["other_goals"]
+        if not isinstance(value, Mapping):
+            Field(value, "other_goals").wrong("a mapping, as a goal file holds it")
+        return read_goal(value, frames=frames, folder=self.project.motions)
 
     def parts(self, frames: int) -> "tuple[tuple[str, Goal], ...]":
         """The goal's items, each as a goal of its own: what only it asks."""

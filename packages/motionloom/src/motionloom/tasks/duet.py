@@ -146,6 +146,7 @@ def compose_pair(
     *,
     path: Goal | None = None,
     person: int = 0,
+    other: Goal | None = None,
     foot_lock: bool = True,
     sampling: PairSampling | None = None,
     progress: Moves | None = None,
@@ -159,6 +160,7 @@ def compose_pair(
         path: where ``person`` is on the ground in every frame of the whole, in the world; goals of segments are that
             person's too. The first person starts at the origin facing +Z, or ``person`` where the path begins.
         person: 0 or 1; whoever has a goal is not moved by pair guidance.
+        other: a path as ``path``, of the other person; goes with one.
         foot_lock: keep planted feet still.
         sampling, progress: as of `long.compose`, with `PairSampling`.
 
@@ -173,11 +175,16 @@ def compose_pair(
     chosen.levels(prior.schedule)
     if not segments:
         raise MotionloomError("there is no segment; say what the two people do, one after the other")
-    track = None if path is None else Track.along(path, prior.fps)
-    asked = [_asked(segments, i, track if i == person else None, person) for i in (0, 1)]
-    sampled = duet_features(prior, block.net(prior), asked, sampling=chosen, progress=progress)
+    tracks = [None if one is None else Track.along(one, prior.fps) for one in (path, other)][:: -1 if person else 1]
+    asked = [_asked(segments, i, tracks[i], person) for i in (0, 1)]
+    if other is not None and path is None:
+        raise MotionloomError("a path of the other person goes with one of the first; give both")
+    both = np.stack([track.place(0).numbers() for track in tracks if track]) if other is not None else None
+    sampled = duet_features(prior, block.net(prior), asked, begin=both, sampling=chosen, progress=progress)
     features, poses = next(sampled)
-    if track:
+    if both is not None:
+        poses = both
+    elif track := tracks[person]:
         poses = poses_at(poses, track.place(0), person)
     pieces = tee(chain([features], (piece for piece, _ in sampled)))
     people = [
@@ -187,7 +194,7 @@ def compose_pair(
                 _of(pieces[i], i),
                 deque(segment.goal for segment in asked[i]),
                 GroundPose.of_numbers(poses[i]),
-                track if i == person else None,
+                tracks[i],
             ),
             prior.fps,
             foot_lock=foot_lock,
@@ -217,6 +224,7 @@ def duet_features(
     net: PairSession,
     segments: Sequence[Sequence[Segment]],
     *,
+    begin: Array | None = None,
     sampling: PairSampling | None = None,
     progress: Moves | None = None,
     **settings: Unpack[PairSettings],
@@ -224,11 +232,12 @@ def duet_features(
     """Pieces (2, frames, 263), not standardised, one per segment, and the ground poses (2, 4) at the very first frame.
 
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
+    begin: the ground poses (2, 4) of the first frame, where they are known.
     Row i is sampled from ``seed + i``. ``batch_size``: rows per network call; it changes speed and memory, not the
     result.
     """
     chosen = PairSampling.of(sampling, settings)
-    denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance, chosen.bodies)
+    denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance, chosen.bodies, begin)
     both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
     made = sample_chain(
@@ -272,6 +281,7 @@ class _PairRow:
     bodies: Bodies | None
     before: "_PairRow | None"
     """The row before, as long as this one is under way."""
+    first: bool = False
     noise: np.ndarray | None = None
     """(2, 4) that this row's D began as."""
     ends: dict[int, np.ndarray] = field(default_factory=dict)
@@ -310,6 +320,8 @@ class _PairDenoiser:
     levels: Sequence[int]
     pair_guidance: float
     bodies: bool
+    begin: Array | None = None
+    """Ground poses (2, 4) of the first frame of the first row, where they are known."""
 
     def rows(
         self, both: Iterable[tuple[Row, ...]], segments: Sequence[Sequence[Segment]], seed: int
@@ -332,7 +344,8 @@ class _PairDenoiser:
             )
             contact = read_contact([one[number].text for one in segments])
             bodies = Bodies.of(mask, frozen, Meeting(contact) if contact else None, still=int(before is not None))
-            before = _PairRow(both_of, net, guidance, bodies if self.bodies and not net.silent else None, before)
+            kept = bodies if self.bodies and not net.silent else None
+            before = _PairRow(both_of, net, guidance, kept, before, first=number == 0)
             yield before
 
     def __call__(self, rows: Sequence[_PairRow], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
@@ -367,6 +380,8 @@ class _PairDenoiser:
     def _begin(self, row: _PairRow, level: int) -> np.ndarray | None:
         """The ground poses when a row begins, by what the row before estimated one level earlier: which of the two
         moves first must not matter."""
+        if row.first:
+            return self.begin
         step = self.levels.index(level)
         return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
 

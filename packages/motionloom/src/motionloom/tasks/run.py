@@ -316,8 +316,9 @@ def _duet(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
     if plan.timeline is not None:
         segments = long.with_loaded(prior, plan.timeline.segments)
         moved = moves(progress, plan.sampling.steps, len(segments))
-        path, person = plan.timeline.path, values.person
-        blocks = duet.compose_pair(prior, block, segments, path=path, person=person, progress=moved, **how)
+        person = values.person
+        paths = {"path": plan.timeline.path, "person": person, "other": plan.goals[1 - person]}
+        blocks = duet.compose_pair(prior, block, segments, **paths, progress=moved, **how)
         made = [tuple(concatenated(*one) for one in zip(*blocks, strict=True))]
     elif len(plan.people) == 2:
         first, second = plan.people
