@@ -35,6 +35,7 @@ def test_an_arm_waves_by_words_of_its_own_while_the_legs_walk(studio: Studio):
     studio.key("Control+z", "Control+z")
     assert np.abs(studio.motion() - walk).max() < 1e-4
     studio.key("Control+Shift+z", "Control+Shift+z")
+    studio.drawn()
     studio.load()
     assert np.abs(studio.motion() - waving).max() < 1e-4
     assert studio.faults == []

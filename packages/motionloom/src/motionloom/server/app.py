@@ -262,7 +262,7 @@ async def _with_file(studio: Studio, call: Callable[[], Any], part: Path | None 
         try:
             return await run_in_threadpool(call)
         except MotionloomError as error:
-            raise MotionloomError(str(error).replace(str(part), name) if part else str(error)) from None
+            raise MotionloomError(str(error).replace(str(part), name) if part else str(error)) from error
 
 
 # Timelines
