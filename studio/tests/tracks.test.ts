@@ -4,7 +4,7 @@ import { type Project, type Take, exampleProject } from "../src/project/model";
 import { plan } from "../src/project/plan";
 import { settled } from "../src/project/settled";
 import { freeze, setPeople } from "../src/project/timeline";
-import { addTrack, changeTrack, shiftTrack, trackCommands, trackKeys } from "../src/project/tracks";
+import { PARTS, addTrack, changeTrack, shiftTrack, trackCommands, trackKeys } from "../src/project/tracks";
 
 const TAKE: Take = { motion: "old", seed: 1, seconds: 6.5, people: 1, how: "drawn" };
 
@@ -45,7 +45,7 @@ describe("a part with words of its own", () => {
 
   it("follows a clip, or looks at a point or the other person", () => {
     const clip = { motion: "waves", name: "waves", seconds: 2 };
-    const looks = addTrack(exampleProject(), 0, [0, 2], "t", [1, 1.5, 2]);
+    const looks = addTrack(exampleProject(), 0, [0, 2], "t", { look: [1, 1.5, 2] });
     const edit = (one: Project) => plan(one).jobs[1];
     expect(edit(changeTrack(waving(), 0, "t", { clip }))).toMatchObject({ source: "waves", between: [[1, 3]] });
     expect(edit(looks)).toMatchObject({ look: [1, 1.5, 2], between: [[0, 2]] });
@@ -56,6 +56,16 @@ describe("a part with words of its own", () => {
     expect(trackCommands(looks, "a")).toEqual(["edit a.npz --look 1 1.5 2 --between 0 2 --seed 1 --out a_1.npz"]);
     expect(() => trackCommands(changeTrack(waving(), 0, "t", { clip }), "a")).toThrow("are in no timeline file");
     expect(read(written(other, { id: "a", revision: 1 }))).toEqual(other);
+  });
+
+  it("is smoothed, the whole body or a part", () => {
+    const smooth = addTrack(exampleProject(), 0, [1, 2], "t", { smooth: 0.3 });
+    const edit = (one: Project) => plan(one).jobs[1];
+    expect(edit(smooth)).toMatchObject({ smooth: 0.3, keep: [], between: [[1, 2]] });
+    expect(edit(smooth)).not.toHaveProperty("prompt");
+    expect(edit(changeTrack(smooth, 0, "t", { part: "head" }))).toMatchObject({ smooth: 0.3, keep: PARTS.head.keep });
+    expect(trackCommands(smooth, "a")).toEqual(["edit a.npz --smooth 0.3 --between 1 2 --seed 1 --out a_1.npz"]);
+    expect(read(written(smooth, { id: "a", revision: 1 }))).toEqual(smooth);
   });
 
   it("is a command of its own beside a timeline file", () => {

@@ -12,7 +12,7 @@ import {
   setPeople,
   splitSegment,
 } from "../project/timeline";
-import { newLook, newTrack, writeTrack } from "../panels/tracks";
+import { newLook, newSmoothing, newTrack, writeTrack } from "../panels/tracks";
 import { removeTrack } from "../project/tracks";
 import type { Stage } from "../stage/stage";
 import { type App, duration } from "./app";
@@ -292,6 +292,7 @@ function stage({ app, deeds, live, stage }: Parts): Actions {
     target: { group, label: "Drag joints", keys: ["T"], run: tool("target") },
     pose: { group, label: "Keyframe the pose at hand", keys: ["O"], run: () => deeds.keyframe() },
     look: { group, label: "Look at a point, or at the other person", keys: ["Shift+L"], run: () => newLook(app) },
+    smooth: { group, label: "Smooth what trembles", keys: ["Shift+N"], run: () => newSmoothing(app) },
     copyPose: { group, label: "Copy the pose", keys: ["Alt+C"], run: () => deeds.copyPose() },
     pastePose: { group, label: "Paste the pose at the playhead", keys: ["Alt+V"], run: () => deeds.pastePose() },
     mirrorPose: { group, label: "Mirror the pose", keys: ["Alt+M"], run: () => deeds.mirrorPose() },

@@ -17,11 +17,15 @@ import {
   newId,
   round,
 } from "../project/model";
-import { ORDER, PARTS, type Part, addTrack, changeTrack } from "../project/tracks";
+import { ORDER, PARTS, SMOOTH, SMOOTHEST, type Part, addTrack, changeTrack } from "../project/tracks";
 import { numberField, section, textButton, wordsArea } from "./parts";
 
 /** Seconds where neither a stretch is marked nor a block selected. */
 const USUAL = 2;
+/** Parts that follow no clip: it would take the person elsewhere. */
+const WORDED: readonly Part[] = ["body", "legs"];
+/** Neither a clip nor smoothing. */
+const PLAIN = { clip: null, smooth: 0 } as const;
 /** Metres before somebody's eyes. */
 const AHEAD = 2;
 
@@ -40,7 +44,16 @@ export function newLook(app: App): void {
   const stretch = stretchOf(app);
   const { person } = app.session.value;
   const look = app.project.value.people.length > 1 ? OTHER : pointAhead(app, stretch[0]);
-  app.project.change("look at something", (old) => addTrack(old, person, stretch, id, look));
+  app.project.change("look at something", (old) => addTrack(old, person, stretch, id, { look }));
+  writeTrack(app, id);
+}
+
+/** Even out what trembles: in what is marked, in the selected block, or from the playhead on. */
+export function newSmoothing(app: App): void {
+  const id = newId();
+  const stretch = stretchOf(app);
+  const { person } = app.session.value;
+  app.project.change("smooth a stretch", (old) => addTrack(old, person, stretch, id, { smooth: SMOOTH }));
   writeTrack(app, id);
 }
 
@@ -78,8 +91,9 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
       typed,
     });
   const { look } = track;
-  const isWorded = track.part !== "head" && !track.clip;
-  const isPoint = track.part === "head" && !track.clip && look !== null && look !== OTHER;
+  const isPlain = !track.clip && !track.smooth;
+  const isWorded = track.part !== "head" && isPlain;
+  const isPoint = track.part === "head" && isPlain && look !== null && look !== OTHER;
   const notes = (keptTake(value)?.notes ?? []).filter((note) => note.text.trim() === track.text.trim());
   return section(
     value.people.length > 1 ? `Part of person ${who + 1}` : "Part",
@@ -92,7 +106,7 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
         onchange: (event: Event) => {
           const part = (event.target as HTMLSelectElement).value as Part;
           const look = part === "head" ? (track.look ?? pointAhead(app, track.from)) : null;
-          change("choose a part", { part, look, clip: part === "legs" ? null : track.clip });
+          change("choose a part", { part, look, clip: WORDED.includes(part) ? null : track.clip });
         },
       },
       ...ORDER.map((part) => h("option", { value: part, selected: part === track.part }, PARTS[part].name)),
@@ -117,6 +131,14 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
           ),
         ),
       ),
+    track.smooth > 0 &&
+      numberField(
+        "Evens out what is quicker than",
+        track.smooth,
+        "s",
+        (seconds) => seconds !== null && seconds > 0 && change("smooth more or less", { smooth: seconds }),
+        { min: 0.05, max: SMOOTHEST },
+      ),
     ...notes.map(({ line }) => h("p", { class: "remark", role: "note" }, line)),
     h(
       "div",
@@ -136,19 +158,15 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
 }
 
 /** What a part follows: words, a clip, or with the head a point or the other person. */
-function doingField(
-  app: App,
-  project: Project,
-  track: Track,
-  change: (part: Partial<Track>) => void,
-): HTMLElement | false {
+function doingField(app: App, project: Project, track: Track, change: (part: Partial<Track>) => void): HTMLElement {
   const isHead = track.part === "head";
+  const isPlain = !track.clip && !track.smooth;
   const choices: [string, boolean, Partial<Track>][] = isHead
     ? [
-        ["Looks at a point", !track.clip && track.look !== OTHER, { clip: null, look: pointAhead(app, track.from) }],
+        ["Looks at a point", isPlain && track.look !== OTHER, { ...PLAIN, look: pointAhead(app, track.from) }],
         ...(project.people.length > 1
           ? [
-              ["Looks at the other person", track.look === OTHER, { clip: null, look: OTHER }] as [
+              ["Looks at the other person", isPlain && track.look === OTHER, { ...PLAIN, look: OTHER }] as [
                 string,
                 boolean,
                 Partial<Track>,
@@ -156,14 +174,14 @@ function doingField(
             ]
           : []),
       ]
-    : [["Words", !track.clip, { clip: null }]];
+    : [["Words", isPlain, PLAIN]];
   const clips = [
     ...project.clips.filter((one) => one.motion !== track.clip?.motion),
     ...(track.clip ? [track.clip] : []),
   ];
-  for (const clip of track.part === "legs" ? [] : clips)
-    choices.push([`Clip: ${clip.name}`, clip.motion === track.clip?.motion, { clip }]);
-  if (choices.length < 2) return false;
+  for (const clip of WORDED.includes(track.part) ? [] : clips)
+    choices.push([`Clip: ${clip.name}`, clip.motion === track.clip?.motion, { clip, smooth: 0 }]);
+  choices.push(["Is smoothed", track.smooth > 0, { clip: null, smooth: track.smooth || SMOOTH }]);
   const chosen = choices.findIndex(([, isChosen]) => isChosen);
   return h(
     "select",

@@ -1,7 +1,7 @@
 /** A project as one file, and back. A file may come from anybody: it is checked before anything is made of it. */
 
 import { JOINTS } from "../body/skeleton";
-import { isPart } from "./tracks";
+import { SMOOTHEST, isPart } from "./tracks";
 import {
   type Given,
   type Project,
@@ -176,6 +176,7 @@ function track(found: unknown, name: string): Track {
     text: word(one.text ?? "", `${name}.text`),
     clip: one.clip ? clip(one.clip, `${name}.clip`) : null,
     look: one.look === OTHER ? OTHER : one.look == null ? null : place(one.look, `${name}.look`),
+    smooth: number(one.smooth ?? 0, `${name}.smooth`, 0, SMOOTHEST),
     from: number(one.from, `${name}.from`, 0, 3600),
     until: number(one.until, `${name}.until`, 0, 3600),
   };

@@ -80,6 +80,8 @@ export interface Track {
   readonly clip: Clip | null;
   /** Where a head looks: a place, or the other person. */
   readonly look: Vec3 | typeof OTHER | null;
+  /** Seconds: what is quicker is evened out; 0: nothing is. */
+  readonly smooth: number;
   readonly from: number;
   readonly until: number;
 }

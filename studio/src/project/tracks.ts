@@ -4,11 +4,15 @@ import { type Project, type Range, type Track, OTHER, clamp, length, newId, roun
 import { changePerson } from "./timeline";
 import type { EditRequest } from "../server/types";
 
+/** Seconds that are evened out where nobody says how many, and at most. */
+export const SMOOTH = 0.3;
+export const SMOOTHEST = 2;
 /** Seconds of the shortest stretch. */
 const LEAST = 0.2;
 
 /** The parts by their names, each with what of the body stays as it is. */
 export const PARTS = {
+  body: { name: "Whole body", keep: [] },
   arms: { name: "Arms", keep: ["lower_body", "torso", "head_neck"] },
   right_arm: { name: "Right arm", keep: ["lower_body", "torso", "head_neck", "left_arm"] },
   left_arm: { name: "Left arm", keep: ["lower_body", "torso", "head_neck", "right_arm"] },
@@ -31,10 +35,10 @@ export function addTrack(
   who: number,
   [from, until]: Range,
   id = newId(),
-  look: Track["look"] = null,
+  { look = null, smooth = 0 }: Partial<Pick<Track, "look" | "smooth">> = {},
 ): Project {
-  const part = look ? "head" : "right_arm";
-  const track: Track = { id, part, text: "", clip: null, look, ...within(project, from, until) };
+  const part = smooth ? "body" : look ? "head" : "right_arm";
+  const track: Track = { id, part, text: "", clip: null, look, smooth, ...within(project, from, until) };
   return changePerson(project, who, (person) => ({ ...person, tracks: [...person.tracks, track] }));
 }
 
@@ -72,20 +76,22 @@ export function trackKeys(project: Project): string[] {
   );
 }
 
-export function trackKey(who: number, { part, text, clip, look, from, until }: Track): string {
-  return JSON.stringify([who, part, text.trim(), clip?.motion, look, from, until]);
+export function trackKey(who: number, { part, text, clip, look, smooth, from, until }: Track): string {
+  return JSON.stringify([who, part, text.trim(), clip?.motion, look, from, until, ...(smooth ? [smooth] : [])]);
 }
 
 /** What the part is to do, in a word or two; empty: nothing yet. */
-export function trackSaid({ part, text, clip, look }: Track): string {
+export function trackSaid({ part, text, clip, look, smooth }: Track): string {
+  if (smooth) return `smoothed, ${smooth} s`;
   if (clip) return clip.name;
   if (part !== "head") return text.trim();
   return look === OTHER ? "looks at the other" : look ? "looks at a point" : "";
 }
 
 /** What an edit says of it; null: nothing is asked. */
-function asked(project: Project, who: number, { part, text, clip, look }: Track): Partial<EditRequest> | null {
+function asked(project: Project, who: number, { part, text, clip, look, smooth }: Track): Partial<EditRequest> | null {
   const { keep } = PARTS[part];
+  if (smooth) return { smooth, keep };
   if (clip) return { source: clip.motion, keep };
   if (part !== "head") return text.trim() ? { prompt: text.trim(), keep } : null;
   if (look === OTHER) return project.people.length > 1 ? { look_at: 1 - who } : null;
@@ -120,8 +126,12 @@ export function trackCommands(project: Project, name: string): string[] {
   const jobs = trackJobs(project, length(project), null);
   if (jobs.some((job) => job.source || job.person || job.look_at !== undefined))
     throw new Error("parts that follow a clip, and those of two people, are in no timeline file; export the motion.");
-  return jobs.map(({ prompt, look, keep = [], between = [], seed }, index) => {
-    const said = look ? ` --look ${look.join(" ")}` : ` '${prompt!.replaceAll("'", "'\\''")}'`;
+  return jobs.map(({ prompt, look, smooth, keep = [], between = [], seed }, index) => {
+    const said = smooth
+      ? ` --smooth ${smooth}`
+      : look
+        ? ` --look ${look.join(" ")}`
+        : ` '${prompt!.replaceAll("'", "'\\''")}'`;
     const kept = keep.map((name) => ` --keep ${name}`).join("");
     const spans = between.map((span) => ` --between ${span.join(" ")}`).join("");
     const [old, next] = [index ? `${name}_${index}` : name, `${name}_${index + 1}`];

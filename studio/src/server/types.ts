@@ -120,6 +120,8 @@ export interface EditRequest {
   readonly source?: string;
   /** turn the head to this place: x, y, z, in metres */
   readonly look?: readonly [number, number, number];
+  /** even out what is quicker than this, in the parts that do not stay, in seconds */
+  readonly smooth?: number;
   /** turn the head to this person's, counted from 0 */
   readonly look_at?: number;
   /** the first motion's seed, the next have the next */

@@ -39,3 +39,23 @@ def test_the_curves_of_a_joint_are_those_of_the_motion(studio: Studio):
     studio.key("Shift+C")
     assert studio.page.locator(".curves").count() == 0
     assert studio.faults == []
+
+
+def test_a_stretch_is_smoothed_and_the_rest_stays(studio: Studio):
+    studio.open(("a person is doing jumping jacks", 4.0))
+    before = studio.motion()[0]
+    studio.key("Home", "Shift+ArrowRight", "Shift+N")
+    project = studio.project()
+    [track] = project["people"][0]["tracks"]
+    assert (track["part"], track["smooth"], track["from"], track["until"]) == ("body", 0.3, 1.0, 3.0)
+    after = studio.motion(project)[0]
+    assert np.abs(np.delete(after - before, slice(20, 60), axis=0)).max() < 1e-4
+    bend = [np.abs(np.diff(one[24:56, RIGHT_WRIST], 2, axis=0)).mean() for one in (after, before)]
+    assert bend[0] < 0.8 * bend[1]
+    studio.page.locator("#inspector select[aria-label='Which part']").select_option("left_arm")
+    arm = studio.motion()[0]
+    assert np.abs(arm[:, RIGHT_WRIST] - before[:, RIGHT_WRIST]).max() < 1e-4
+    assert np.abs(arm[24:56, LEFT_WRIST] - before[24:56, LEFT_WRIST]).max() > 0.01
+    studio.key("Control+z", "Control+z")
+    assert np.abs(studio.motion()[0] - before).max() < 1e-4
+    assert studio.faults == []

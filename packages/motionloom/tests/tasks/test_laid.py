@@ -13,7 +13,7 @@ from motionloom.requests.edit import Edit
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import changes_asked, edit
-from motionloom.tasks.laid import Lay, Look
+from motionloom.tasks.laid import Lay, Look, Smooth
 from motionloom.tasks.run import Models, Plan, run
 from tests.recorded import tiny
 from tests.tasks.test_edit import person, rig
@@ -31,7 +31,7 @@ def waving(seconds: float, fps: float = 30.0) -> Motion:
     return Motion(SMPL22, fps, np.tile([9.0, 0.95, 9.0], (frames, 1)), rot.rotvec_to_quat(turns))
 
 
-def changed(clip: Motion, *changes: Lay | Look) -> Motion:
+def changed(clip: Motion, *changes: Lay | Look | Smooth) -> Motion:
     """One version, of weights that are not used."""
     return edit(tiny.prior(), clip, "", changes)[0]
 
@@ -132,3 +132,45 @@ def test_somebody_looks_at_the_other_person() -> None:
         for motion in (one, first)
     )
     assert after < before - 30
+
+
+def trembling(seconds: float) -> tuple[Motion, Motion]:
+    """Somebody who moves, and the same with a tremor of 8 degrees in every joint and 2 cm in the pelvis."""
+    calm = person(seconds)
+    shake = np.random.default_rng(1).normal(size=(len(calm), 22, 3))
+    turns = rot.multiply(calm.rotations, rot.rotvec_to_quat(np.radians(8) * shake))
+    return calm, replace(calm, rotations=turns, root=calm.root + 0.02 * shake[:, 0])
+
+
+def quickness(motion: Motion) -> np.ndarray:
+    """(frames - 2,) metres: how far the wrists and ankles are from the middle of where they were and will be."""
+    places = motion.positions()[:, [7, 8, 20, 21]]
+    return np.linalg.norm(places[2:] - 2 * places[1:-1] + places[:-2], axis=-1).mean(axis=-1)
+
+
+def test_a_tremor_goes_and_what_is_slow_stays() -> None:
+    calm, shaken = trembling(4.0)
+    made = changed(shaken, Smooth((), 0.4))
+    assert quickness(made).mean() < 0.25 * quickness(shaken).mean()
+    apart = np.linalg.norm(made.positions() - calm.positions(), axis=-1)
+    assert apart.mean() < 0.6 * np.linalg.norm(shaken.positions() - calm.positions(), axis=-1).mean()
+    assert np.abs(changed(calm, Smooth((), 0.1)).positions() - calm.positions()).max() < 0.05
+
+
+def test_only_a_stretch_and_only_some_parts_are_smoothed() -> None:
+    _, shaken = trembling(4.0)
+    made = changed(shaken, Smooth(((1.0, 3.0),), 0.4, ALL_BUT_THE_ARM))
+    arm = SMPL22.groups["right_arm"]
+    others = [joint for joint in range(22) if joint not in arm]
+    assert np.array_equal(made.rotations[:, others], shaken.rotations[:, others])
+    assert np.array_equal(made.root, shaken.root)
+    inside = slice(round(1.0 * shaken.fps), round(3.0 * shaken.fps))
+    assert np.array_equal(np.delete(made.rotations, inside, axis=0), np.delete(shaken.rotations, inside, axis=0))
+    middle = slice(inside.start + 10, inside.stop - 10)
+    turned = [np.abs(np.diff(one.rotations[middle][:, list(arm)], 2, axis=0)).mean() for one in (made, shaken)]
+    assert turned[0] < 0.25 * turned[1]
+
+
+def test_smoothing_is_asked_with_seconds_and_alone() -> None:
+    assert [type(one) for one in changes_asked("", smooth=0.2, keep=["head"], between=[(0, 1)])] == [Smooth]
+    assert [type(one).__name__ for one in changes_asked("waves", smooth=0.2)] == ["Redraw", "Smooth"]

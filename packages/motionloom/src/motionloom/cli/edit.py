@@ -41,7 +41,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("clip", type=Path, metavar="CLIP")
     parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")
-    add_options(parser, Edit, "keep", "between", "extend", "strength", "look", *SAMPLED, *FINISH)
+    add_options(parser, Edit, "keep", "between", "extend", "strength", "look", "smooth", *SAMPLED, *FINISH)
     parser.add_argument(
         "--source", type=Path, metavar="CLIP", help="a clip that the parts that do not stay follow, instead of words"
     )

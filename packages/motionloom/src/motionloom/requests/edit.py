@@ -29,5 +29,13 @@ class Edit(Finish, Adapted):
     look: tuple[float, float, float] | None = declare(
         "number", "turn the head to this place: x, y, z", None, low=-1000, high=1000, size=3, unit="metres"
     )
+    smooth: float = declare(
+        "number",
+        "even out what is quicker than this, in the parts that do not stay",
+        0.0,
+        low=0,
+        high=2,
+        unit="seconds",
+    )
     look_at: int | None = declare("whole", "turn the head to this person's, counted from 0", None, low=0, high=7)
     sampling: Sampling = group(Sampling(count=1), *SAMPLED)

@@ -23,7 +23,7 @@ from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.laid import Lay, Look, Span, Spanned, check_parts, joints_of, kept_joints
+from motionloom.tasks.laid import Lay, Look, Smooth, Span, Spanned, check_parts, joints_of, kept_joints
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
     apply_sample,
@@ -124,7 +124,7 @@ class Loop:
         return _looped(sampler, clip, self.blend, seed)
 
 
-Change: TypeAlias = Redraw | Extend | Loop | Lay | Look
+Change: TypeAlias = Redraw | Extend | Loop | Lay | Look | Smooth
 
 
 def edit(
@@ -145,7 +145,8 @@ def edit(
         prior: weights that make HumanML3D's 263 numbers.
         motion: the clip, on any humanoid skeleton and at any rate; what is not changed comes back bit for bit.
         text: what the person does; an empty one asks for nothing in particular.
-        changes: `Redraw`, `Extend`, `Loop`, `Lay` and `Look`, one after the other; a text alone redraws the whole clip.
+        changes: `Redraw`, `Extend`, `Loop`, `Lay`, `Look` and `Smooth`, one after the other; a text alone
+            redraws the whole clip.
         skeleton: the clip's own, or the 22-joint person. The result stands where the clip stood.
         foot_lock: keep planted feet still where legs are sampled.
         sampling: or single settings of it as keywords; version i of ``count`` is sampled from ``seed + i``.
@@ -198,11 +199,12 @@ def changes_asked(
     blend: float = BLEND,
     source: Motion | None = None,
     look: NDArray[np.float64] | None = None,
+    smooth: float = 0.0,
 ) -> list[Change]:
     """What single options ask for: with neither ``between`` nor ``extend`` a text is about the whole clip.
 
-    source: a clip whose parts take the place of a text. look: where the head looks, as of `Look`. Raises
-    MotionloomError where nothing is asked, and for a text beside a source.
+    source: a clip whose parts take the place of a text. look: where the head looks, as of `Look`.
+    smooth: seconds, as of `Smooth`. Raises MotionloomError where nothing is asked, and for a text beside a source.
     """
     asked: list[Change] = []
     said = bool(text.strip()) and not extend
@@ -210,10 +212,11 @@ def changes_asked(
         if said:
             raise MotionloomError("parts do what a text says or what another clip does; leave out one of them")
         asked.append(Lay(tuple(between), source, tuple(keep)))
-    elif said or (between and look is None):
+    elif said or (between and look is None and not smooth):
         asked.append(Redraw(tuple(between), tuple(keep), strength))
-    elif keep:
+    elif keep and not smooth:
         raise MotionloomError("kept parts belong to a text or a stretch, and there is neither; add one")
+    asked += [Smooth(tuple(between), smooth, tuple(keep))] if smooth else []
     asked += [Look(tuple(between), look)] if look is not None else []
     asked += [Extend(extend)] if extend else []
     asked += [Loop(blend)] if loop else []

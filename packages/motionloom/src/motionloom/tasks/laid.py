@@ -1,4 +1,4 @@
-"""Changes of a clip without sampling: parts of another clip are laid over it, and a head looks somewhere."""
+"""Changes of a clip without sampling: parts of another clip over it, a head that looks somewhere, smoothing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +12,7 @@ from motionloom import rotations as rot
 from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.kinematics.feet import clean_feet, planted_feet
 from motionloom.kinematics.gaze import looking
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
@@ -93,6 +94,43 @@ class Look(Spanned):
             end = np.inf if last == len(clip) else (last - first - np.arange(last - first)) / clip.fps
             weights[first:last] = smoothstep(np.minimum(begin, end) / EASE)
         return looking(clip, self.at, weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth(Spanned):
+    """Joints and the root without what is quicker than some seconds, in each stretch."""
+
+    seconds: float = 0.2
+    """Two standard deviations of the Gaussian that is laid over rotations and places."""
+    keep: Sequence[str] = ()
+    """Parts that stay, as of `Redraw`."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_parts(self.keep)
+
+    def apply(self, sampler: Any, clip: Motion, seed: int) -> Motion:
+        """The clip, smoothed; feet that stood still stand still, if the sampler keeps them and the legs do not stay."""
+        kept, width = kept_joints(clip, self.keep), self.seconds * clip.fps / 2
+        turns = low_passed(rot.unroll(clip.rotations).reshape(len(clip), -1), width).reshape(clip.rotations.shape)
+        made = with_place(replace(clip, rotations=rot.normalize(turns)), low_passed(place_of(clip), width))
+        if sampler.foot_lock and not joints_of(self.keep).issuperset(SMPL22.groups["lower_body"]):
+            still = planted_feet(to_smpl22(clip).positions(), clip.fps)
+            made = onto(clean_feet(to_smpl22(made), contacts=still), made)
+        for first, last in self.frames(clip):
+            clip = splice(clip, made, first, last=last, kept=kept)
+        return clip
+
+
+def low_passed(values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """(frames, channels) smoothed along time by a Gaussian of ``width`` frames; both ends go on as their mirror image.
+
+    The mirror image is about the end itself, so that a steady slope stays one.
+    """
+    reach = min(int(np.ceil(2.5 * width)), len(values) - 1)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(width, 1e-6)) ** 2)
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.stack([np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T], axis=-1)
 
 
 def check_parts(keep: Sequence[str]) -> None:

@@ -270,7 +270,7 @@ def _controlled(made: control.Controlled) -> Result:
 
 def _edited(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     values, people = plan.values, list(plan.people)
-    names = ("keep", "between", "loop", "blend", "extend", "strength")
+    names = ("keep", "between", "loop", "blend", "extend", "strength", "smooth")
     own, given = people[values.person], {name: getattr(values, name) for name in names}
     look = None if values.look is None else np.asarray(values.look)
     if values.look_at is not None:
