@@ -221,7 +221,9 @@ def changes_asked(
     asked += [Extend(extend)] if extend else []
     asked += [Loop(blend)] if loop else []
     if not asked:
-        raise MotionloomError("nothing to change: say in words what to make, name a stretch, smooth, look, loop or extend")
+        raise MotionloomError(
+            "nothing to change: say in words what to make, name a stretch, smooth, look, loop or extend"
+        )
     return asked
 
 
