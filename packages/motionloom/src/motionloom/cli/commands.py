@@ -9,22 +9,22 @@ from importlib.util import find_spec
 Commands = argparse._SubParsersAction
 Add = Callable[[Commands], None]
 
-FAMILIES = (
-    "generate",
-    "compose",
-    "live",
-    "control",
-    "edit",
-    "predict",
-    "duet",
-    "batch",
-    "serve",
-    "files",
-    "robots",
-    "weights",
-    "completion",
-)
-"""Modules beside this one, each of which registers a command or some that belong together."""
+FAMILIES = {
+    "generate": ("generate",),
+    "compose": ("compose",),
+    "live": ("live",),
+    "control": ("control",),
+    "edit": ("edit",),
+    "predict": ("predict", "switch"),
+    "duet": ("duet",),
+    "batch": ("batch",),
+    "serve": ("serve", "studio", "mcp"),
+    "files": ("export", "view", "info"),
+    "robots": ("robot-check",),
+    "weights": ("weights",),
+    "completion": ("completion",),
+}
+"""Modules beside this one, and the commands that each registers; one that is run imports no other."""
 GROUP = "motionloom.commands"
 """Entry points by which an installed package adds a command: its name, and the function that registers it."""
 
@@ -73,10 +73,11 @@ def add_commands(commands: Commands, command: str | None) -> None:
     if command in OTHERS:
         _registered(command)(commands)
         return
-    for family in FAMILIES:
+    owner = next((family for family, names in FAMILIES.items() if command in names), None)
+    for family in FAMILIES if owner in (None, "completion") else [owner]:
         import_module(f"motionloom.cli.{family}").add(commands)
-        if command in commands.choices and command != "completion":
-            return
+    if owner not in (None, "completion"):
+        return
     for name, other in OTHERS.items():
         if command in (None, "completion") and find_spec(other.module.partition(".")[0]):
             _registered(name)(commands)
