@@ -2,6 +2,8 @@
 
 import io as stdio
 import zipfile
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +11,18 @@ from hypothesis import given, settings
 
 from motionloom import io
 from motionloom.errors import MotionloomError
+from motionloom.io.character import load_character
 from motionloom.io.npz import load_npz, save_npz
 from motionloom.motion import Motion
+from motionloom.retarget import retarget, to_smpl22
 from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
+from motionloom.skeleton import SMPL22, Poses
 from tests.io.motions import motions
+from tests.io.rigged import Hero
+
+
+def walk() -> Motion:
+    return io.load(Path(__file__).parents[4] / "examples" / "clips" / "walk.bvh")
 
 
 def still(frames: int = 3) -> Motion:
@@ -33,6 +42,34 @@ def test_random_motions_come_back_exactly(tmp_path_factory, motion):
         assert again.translations is None
     else:
         np.testing.assert_array_equal(again.translations, motion.translations)
+
+
+def test_what_the_file_of_a_body_says_of_it_comes_back(tmp_path):
+    """Feet that know their soles, joints that a VRM names, and the poses of a BVH are needed by `retarget`."""
+    turns = np.tile(IDENTITY, (2, 22, 1))
+    body = replace(
+        SMPL22,
+        on_floor=True,
+        humanoid={"left_knee": "left_ankle", "head": "neck"},
+        soles={7: np.arange(6.0).reshape(2, 3), 8: np.ones((1, 3))},
+        poses=Poses(np.ones((2, 3)), turns, np.zeros((2, 22, 3))),
+    )
+    again = load_npz(save_npz(replace(still(), skeleton=body), tmp_path / "a.npz")).skeleton
+    assert again.on_floor
+    assert again.humanoid == body.humanoid
+    assert again.soles.keys() == body.soles.keys()
+    assert all(np.array_equal(again.soles[joint], body.soles[joint]) for joint in body.soles)
+    assert again.poses is not None
+    for name in ("root", "rotations", "translations"):
+        np.testing.assert_array_equal(getattr(again.poses, name), getattr(body.poses, name))
+
+
+def test_a_body_out_of_an_archive_is_retargeted_as_the_one_in_memory(tmp_path):
+    hero = load_character(Hero().write(tmp_path / "hero.glb"))
+    moving = retarget(walk(), hero.skeleton)
+    stored = load_npz(save_npz(moving, tmp_path / "hero.npz"))
+    np.testing.assert_allclose(to_smpl22(stored).positions(), to_smpl22(moving).positions(), atol=1e-9)
+    np.testing.assert_allclose(retarget(walk(), stored.skeleton).positions(), moving.positions(), atol=1e-9)
 
 
 def test_the_groups_of_our_own_skeleton_come_back(tmp_path):
@@ -55,6 +92,7 @@ def test_numpy_reads_the_documented_arrays_without_pickle(tmp_path):
             "root",
             "rotations",
             "positions",
+            "on_floor",
         }
 
 
@@ -89,6 +127,13 @@ def test_plain_positions_are_read_where_they_say_their_rate(tmp_path):
         ({"fps": np.array(-30)}, "frame rate"),
         ({"fps": np.array("thirty")}, "'fps' must have the shape"),
         ({"version": np.array(7)}, "version 7"),
+        ({"on_floor": np.array(2.0)}, "'on_floor' must have the shape"),
+        ({"humanoid": np.array([["head", "nobody"]])}, "'humanoid' must pair joints"),
+        ({"humanoid": np.array(["head", "neck"])}, "'humanoid' must have the shape"),
+        ({"sole_joints": np.array([22]), "sole_points": np.zeros((1, 3))}, "joints that do not exist"),
+        ({"sole_joints": np.array([7])}, "no array 'sole_points'"),
+        ({"pose_root": np.zeros((1, 3)), "pose_rotations": np.zeros((1, 22, 4))}, "'pose_rotations' must be unit"),
+        ({"pose_root": np.zeros((0, 3)), "pose_rotations": np.zeros((0, 22, 4))}, "'pose_root' has no pose"),
         ({"offsets": np.zeros((21, 3))}, "'offsets' must have the shape"),
         ({"offsets": np.array([{"a": 1}], dtype=object)}, "pickled objects are never read"),
     ],

@@ -13,7 +13,14 @@ Layout (version 1), for a motion of T frames and J joints:
 ``rotations``   (T, J, 4) float     quaternions (w, x, y, z), each joint in its parent's frame
 ``translations``  (T, J, 3) float   only where bones change length: metres in the parent's frame
 ``positions``   (T, J, 3) float32   metres in the world; for your convenience, not read back
+``on_floor``    bool                whether the rest pose stands on y = 0
+``humanoid``    (H, 2) text         SMPL joint and the joint that plays it, where the file of the body named them
+``sole_joints`` (S,) int            joints of the feet, one for each corner of the mesh below them
+``sole_points`` (S, 3) float        metres in the frames of these joints
+``pose_root``, ``pose_rotations``, ``pose_translations``: some poses of the file that the skeleton is from
 ==============  ==================  ===========================================================================
+
+Those from ``translations`` on may be missing.
 
 An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints in metres and an ``fps`` is read too.
 """
@@ -28,7 +35,7 @@ import zlib
 from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import BinaryIO, TypedDict, cast
 
 import numpy as np
 
@@ -36,7 +43,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io import text
 from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 VERSION = 1
 MAX_JOINTS = 10_000
@@ -82,10 +89,25 @@ def save_npz(motion: Motion, path: Path | str, *, packed: bool = True) -> Path:
         "rotations": motion.rotations,
         "positions": motion.positions().astype(np.float32),
         **moved,
+        **_body_arrays(skeleton),
     }
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         (np.savez_compressed if packed else np.savez)(file, **arrays)
     return Path(path)
+
+
+def _body_arrays(skeleton: Skeleton) -> dict[str, np.ndarray]:
+    """What the file of a body says of it beside its bones."""
+    arrays = {"on_floor": np.array(skeleton.on_floor)}
+    if skeleton.humanoid:
+        arrays["humanoid"] = np.array(sorted(skeleton.humanoid.items()))
+    if skeleton.soles:
+        arrays["sole_joints"] = np.repeat(list(skeleton.soles), [len(points) for points in skeleton.soles.values()])
+        arrays["sole_points"] = np.concatenate(list(skeleton.soles.values()))
+    if (poses := skeleton.poses) is not None:
+        arrays |= {"pose_root": poses.root, "pose_rotations": poses.rotations}
+        arrays |= {} if poses.translations is None else {"pose_translations": poses.translations}
+    return arrays
 
 
 def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
@@ -252,19 +274,61 @@ def _motion(arrays: dict[str, np.ndarray], fps: float, path: Path | str) -> Moti
     ends = {int(e) for e in _array(arrays, "ends", (None,), path=path)} if "ends" in arrays else set()
     if any(not 0 <= e < joints for e in ends):
         raise MotionloomError(f"{path}: 'ends' names joints that do not exist; there are {joints}")
-    root = _array(arrays, "root", (None, 3), path=path)
-    rotations = _array(arrays, "rotations", (len(root), joints, 4), path=path).astype(np.float64)
-    lengths = np.linalg.norm(rotations, axis=-1)
-    if not (np.abs(lengths - 1) < 1e-3).all():
-        odd = lengths.flat[np.abs(lengths - 1).argmax()]
-        raise MotionloomError(f"{path}: 'rotations' must be unit quaternions; one has the length {odd:g}")
-    moved = _array(arrays, "translations", (len(root), joints, 3), path=path) if "translations" in arrays else None
+    root, rotations, moved = _frames(arrays, ("root", "rotations", "translations"), joints, path)
     groups = SMPL22.groups if names == SMPL22.names and parents == SMPL22.parents else {}
     try:
-        skeleton = Skeleton(names, parents, offsets.astype(np.float64), frozenset(ends), groups)
+        body = _body(arrays, names, path)
+        skeleton = Skeleton(names, parents, offsets.astype(np.float64), frozenset(ends), groups, **body)
         return Motion(skeleton, fps, root, rotations, moved)
     except MotionloomError as error:
         raise MotionloomError(f"{path}: {error}") from None
+
+
+def _frames(
+    arrays: dict[str, np.ndarray], names: tuple[str, str, str], joints: int, path: Path | str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Places of the root, rotations, and translations where there are any."""
+    root = _array(arrays, names[0], (None, 3), path=path)
+    rotations = _array(arrays, names[1], (len(root), joints, 4), path=path).astype(np.float64)
+    lengths = np.linalg.norm(rotations, axis=-1)
+    if not (np.abs(lengths - 1) < 1e-3).all():
+        odd = lengths.flat[np.abs(lengths - 1).argmax()]
+        raise MotionloomError(f"{path}: '{names[1]}' must be unit quaternions; one has the length {odd:g}")
+    moved = _array(arrays, names[2], (len(root), joints, 3), path=path) if names[2] in arrays else None
+    return root, rotations, moved
+
+
+class _Body(TypedDict, total=False):
+    """Arguments of a skeleton that say more of it than its bones."""
+
+    humanoid: dict[str, str]
+    on_floor: bool
+    soles: dict[int, np.ndarray]
+    poses: Poses
+
+
+def _body(arrays: dict[str, np.ndarray], names: tuple[str, ...], path: Path | str) -> _Body:
+    """The opposite of `_body_arrays`."""
+    body = _Body()
+    if "on_floor" in arrays:
+        body["on_floor"] = bool(_array(arrays, "on_floor", (), path=path, kinds="b"))
+    if "humanoid" in arrays:
+        pairs = _array(arrays, "humanoid", (None, 2), path=path, kinds="U")
+        body["humanoid"] = {str(part): str(name) for part, name in pairs}
+        if any(part not in SMPL22.names or name not in names for part, name in body["humanoid"].items()):
+            raise MotionloomError(f"{path}: 'humanoid' must pair joints of SMPL with joints of the file")
+    if "sole_joints" in arrays:
+        joints = _array(arrays, "sole_joints", (None,), path=path, kinds="iu")
+        points = _array(arrays, "sole_points", (len(joints), 3), path=path).astype(np.float64)
+        if any(not 0 <= j < len(names) for j in joints):
+            raise MotionloomError(f"{path}: 'sole_joints' names joints that do not exist; there are {len(names)}")
+        body["soles"] = {int(j): points[joints == j] for j in dict.fromkeys(joints.tolist())}
+    if "pose_root" in arrays:
+        frames = _frames(arrays, ("pose_root", "pose_rotations", "pose_translations"), len(names), path)
+        if not len(frames[0]):
+            raise MotionloomError(f"{path}: 'pose_root' has no pose; leave it out")
+        body["poses"] = Poses(*frames)
+    return body
 
 
 def _from_positions(arrays: dict[str, np.ndarray], fps: float | None, path: Path | str) -> Motion:
