@@ -16,6 +16,7 @@ the same pose when these agree. In a sensible rest pose (T, A or arms down; upri
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,19 +27,23 @@ from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget.axes import (
     ARMS,
+    CHEST,
     CHILD,
+    COLLARS,
     FEET,
     HEAD,
     LEGS,
+    SHOULDERS,
     SPINE,
     TOES,
+    collar_frames,
     frame,
     hips_line,
     shoulder_line,
     unit,
 )
 from motionloom.retarget.joint_map import JointMap, Override, joint_map
-from motionloom.retarget.measured import measure_frames, measure_sole, stands_on_flat_feet
+from motionloom.retarget.measured import arms_hang, measure_frames, measure_sole, stands_on_flat_feet
 from motionloom.retarget.topology import below
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
@@ -71,6 +76,8 @@ class Body:
     """(3,) up in rest pose; +Y where the rest pose is no standing person."""
     toe_height: float
     """Metres from the ground up to the toe joint on a flat foot."""
+    shoulders: Array
+    """(2, 3) metres from the joint of the chest to shoulders that rest, in the anatomical frame of the chest."""
     tips: Array
     """(22, 3) metres in the frame of the joint that turns it: where a foot without toes has them; 0 elsewhere."""
 
@@ -78,6 +85,11 @@ class Body:
     def on_floor(self) -> bool:
         """Whether the rest pose is a person who stands on the ground y = 0."""
         return self.skeleton.on_floor and self.upright and float(self.up[1]) > 0.9
+
+    @property
+    def known(self) -> bool:
+        """Whether the frames say how a joint is turned against a standing person's, and not only where bones point."""
+        return self.upright or self.measured
 
     @property
     def broad(self) -> float:
@@ -88,6 +100,11 @@ class Body:
     def leg(self) -> float:
         """Metres of thigh and shin, mean of both sides."""
         return float(np.mean([self.bone(1) + self.bone(4), self.bone(2) + self.bone(5)]))
+
+    @property
+    def breadth(self) -> float:
+        """Metres from shoulder to shoulder."""
+        return max(float(np.linalg.norm(shoulder_line(self.rest))), 1e-6)
 
     @property
     def arm(self) -> float:
@@ -151,16 +168,35 @@ def _read_body(skeleton: Skeleton, override: Override | None, poses: Poses | Non
         planted = float(toes.mean() if _lifted_foot(rest, axes) is None else toes.min())
         height = planted if upright else _toe_height(skeleton, found, rest, axes[1])
         frames = _rest_frames(rest, axes)
-        body = Body(skeleton, points, drivers, rest, frames, True, False, axes[1], height, tips)
+        resting = _on_chest(skeleton, drivers, frames, rest)
+        body = Body(skeleton, points, drivers, rest, frames, True, False, axes[1], height, resting, tips)
         return body if poses is None or skeleton.on_floor else _on_measured_feet(body, poses)
-    body = Body(skeleton, points, drivers, rest, _odd_frames(rest), False, False, np.eye(3)[1], 0.0, tips)
+    frames = _odd_frames(rest)
+    resting = _on_chest(skeleton, drivers, frames, rest)
+    body = Body(skeleton, points, drivers, rest, frames, False, False, np.eye(3)[1], 0.0, resting, tips)
     return body if poses is None else _measured(body, poses)
 
 
 def _measured(body: Body, poses: Poses) -> Body:
     """The body with all frames measured from poses."""
     places, world = _posed(body, poses)
-    return replace(body, frames=measure_frames(places, world, body.drivers, body.frames), measured=True)
+    body = replace(body, frames=measure_frames(places, world, body.drivers, body.frames), measured=True)
+    chest = body.drivers[CHEST]
+    if chest is None:
+        return body
+    joint = Motion(body.skeleton, 30.0, poses.root, poses.rotations, poses.translations).positions()[:, chest]
+    turned = rot.inverse(rot.multiply(world[:, chest], body.frames[CHEST]))
+    seen = rot.rotate(turned[:, None], places[:, SHOULDERS] - joint[:, None])
+    weights = arms_hang(places)[..., None]
+    return replace(body, shoulders=(weights * seen).sum(axis=0) / weights.sum(axis=0))
+
+
+def _on_chest(skeleton: Skeleton, drivers: Sequence[int | None], frames: Array, rest: Array) -> Array:
+    """(2, 3) metres from the joint of the chest to the shoulders of a rest pose; 0 where no joint turns a chest."""
+    if (chest := drivers[CHEST]) is None:
+        return np.zeros((2, 3))
+    joint = skeleton.rest_positions()[chest]
+    return np.asarray(rot.rotate(rot.inverse(frames[CHEST]), rest[list(SHOULDERS)] - joint), dtype=np.float64)
 
 
 def _on_measured_feet(body: Body, poses: Poses) -> Body:
@@ -255,6 +291,7 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
             bone = up
         frames[j] = frame(bone, forward if j in ARMS else left)
     frames[[0, *SPINE, HEAD]] = frame(up, left)
+    frames[list(COLLARS)] = collar_frames(frames[CHEST])
     lifted = _lifted_foot(rest, axes)
     for side, (foot, toe) in enumerate(zip(FEET, TOES)):
         heading = rest[toe] - rest[foot]

@@ -1,4 +1,4 @@
-"""Hands where the source has them against its chest, though the shoulders cannot go where the source's go.
+"""Shoulders as far from rest as the source's, or hands where they would be, against the chest.
 
 Where a rig has no collar bones, its shoulders stay on the chest, or an animator pulls the arms out of their sockets. On
 a body of the other kind arms of the same directions would start elsewhere, and two hands on one sword would part.
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.retarget.anatomy import Body
-from motionloom.retarget.axes import CHEST, SHOULDERS
+from motionloom.retarget.axes import CHEST, COLLARS, SHOULDERS
 from motionloom.retarget.limbs import aim, bend, placed
 
 Array = NDArray[np.float64]
@@ -25,9 +25,29 @@ def shoulders_moved(positions: Array, world: Array, body: Body) -> Array:
     if chest is None or body.arm < 1e-6:
         return np.zeros((len(world), 2, 3))
     now = np.einsum("sj,fjc->fsc", body.points[list(SHOULDERS)], positions) - positions[:, chest, None]
-    rest = body.rest[list(SHOULDERS)] - body.skeleton.rest_positions()[chest]
-    moved = rot.rotate(rot.inverse(world[:, chest])[:, None], now) - rest
-    return np.asarray(rot.rotate(rot.inverse(body.frames[CHEST]), moved) / body.arm, dtype=np.float64)
+    turned = rot.inverse(rot.multiply(world[:, chest], body.frames[CHEST]))
+    return np.asarray((rot.rotate(turned[:, None], now) - body.shoulders) / body.arm, dtype=np.float64)
+
+
+def shrug(world: Array, chest: Array, moved: Array, body: Body) -> Array:
+    """World rotations (frames, joints, 4) with collars aimed at where shoulders belong; arms keep their orientation.
+
+    chest: (frames, 4) the anatomical frame of the chest as the source has it. moved: (frames, 2, 3) how far the
+    shoulders are from their rest on it, in this frame and in breadths of the shoulders.
+    """
+    joint = body.drivers[CHEST]
+    if joint is None:
+        return world
+    positions = placed(body.skeleton, world)
+    places = body.places(positions, world)
+    own = rot.inverse(rot.multiply(world[:, joint], body.frames[CHEST]))
+    for side, (collar, shoulder) in enumerate(zip(COLLARS, SHOULDERS)):
+        if body.drivers[collar] == body.drivers[shoulder]:
+            continue
+        start = rot.rotate(own, places[:, collar] - positions[:, joint])
+        bone = rot.rotate(chest, body.shoulders[side] + moved[:, side] * body.breadth - start)
+        world = aim(world, body, collar, places[:, shoulder] - places[:, collar], bone)
+    return world
 
 
 def reach(world: Array, moved: Array, body: Body) -> Array:

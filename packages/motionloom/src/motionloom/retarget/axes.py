@@ -79,3 +79,14 @@ def trunk_frame(across: Array, along: Array) -> Array:
     person = SMPL22.rest_positions()
     lean = rot.multiply(rot.inverse(frame(hips_line(person), trunk(person))), frame(np.eye(3)[1], np.eye(3)[0]))
     return rot.multiply(frame(across, along), lean)
+
+
+def collar_frames(chest: Array) -> Array:
+    """(..., 2, 4) the frames of both collars where shoulders rest on a chest (..., 4), as on the uniform person.
+
+    A collar bone is short, and skeletons put its ends in different places: what counts is how far it is from rest.
+    """
+    person = SMPL22.rest_positions()
+    upright = frame(np.eye(3)[1], np.eye(3)[0])
+    bones = frame(person[list(SHOULDERS)] - person[list(COLLARS)], np.eye(3)[2])
+    return rot.multiply(chest[..., None, :], rot.multiply(rot.inverse(upright), bones))

@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.retarget.axes import (
     ARMS,
+    CHEST,
     CHILD,
+    COLLARS,
     FEET,
     HEAD,
+    SHOULDERS,
     SPINE,
     TOES,
+    collar_frames,
     frame,
     hips_line,
     shoulder_line,
@@ -66,6 +70,8 @@ def frames_of_places(places: Array) -> tuple[Array, Array]:
     for j, share in ((0, 0.0), (3, 1 / 3), (6, 2 / 3), (9, 1.0), (HEAD, 1.0)):
         result[:, j] = trunk_frame((1 - share) * unit(hips) + share * unit(shoulders), along)
     weights[:, [0, *SPINE, 12, HEAD]] = _standing(places, along)[:, None]
+    result[:, COLLARS] = collar_frames(result[:, CHEST])
+    weights[:, COLLARS] = arms_hang(places)
     for upper, lower, end in ((1, 4, 7), (2, 5, 8)):
         a, b = unit(places[:, lower] - places[:, upper]), unit(places[:, end] - places[:, lower])
         bend = _bend(a, b)
@@ -146,6 +152,13 @@ def _standing(places: Array, along: Array) -> Array:
     thighs = unit(places[:, [1, 2]].mean(axis=1) - places[:, [4, 5]].mean(axis=1))
     straight = (unit(along) * thighs).sum(axis=-1).clip(0, 1) * unit(along)[:, 1].clip(0, 1)
     return np.maximum(straight**8, _DOUBTFUL)
+
+
+def arms_hang(places: Array) -> Array:
+    """(frames, 2) near 1 where an upper arm hangs down along the trunk, so that its shoulder rests."""
+    arms, along = unit(places[:, [18, 19]] - places[:, SHOULDERS]), unit(trunk(places))
+    down = -(arms * along[:, None]).sum(axis=-1).clip(-1, 0)
+    return np.maximum(down**8, _DOUBTFUL)
 
 
 def _bend(a: Array, b: Array) -> Array:

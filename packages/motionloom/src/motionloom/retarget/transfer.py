@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import Body, read_body
-from motionloom.retarget.arms import reach, shoulders_moved
+from motionloom.retarget.arms import reach, shoulders_moved, shrug
 from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, SPINE, TOES, trunk
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
@@ -99,6 +99,8 @@ def retarget(
     world = _orient(pose, body)
     if not shrugs:
         world = reach(world, pose.shoulders, body)
+    elif source.known and body.known:
+        world = shrug(world, pose.frames[:, CHEST], pose.shoulders * source.arm / source.breadth, body)
     made = _place(world, goals, body, motion.fps)
     return made if root is None else place_root(made, body, root)
 
@@ -139,7 +141,8 @@ def _read_pose(motion: Motion, source: Body, *, shrugs: bool) -> _Pose:
         else:  # no such bone, such as a collar bone: it moves with the one above as on the uniform person
             frames[:, j], bone = _borrowed(frames[:, above], j)
             places[:, j] = places[:, CHILD[j]] - bone
-        if CHILD[j] is not None and j not in (0, *SPINE, *FEET):  # the places say where a bone points
+        rests = driver is not None and j in COLLARS and source.known
+        if CHILD[j] is not None and not rests and j not in (0, *SPINE, *FEET):  # the places say where a bone points
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
     moved = shoulders_moved(motion.positions(), world, source)
@@ -286,8 +289,8 @@ def _orient(pose: _Pose, body: Body) -> Array:
         j = first[k]
         world[:, k] = rot.multiply(pose.frames[:, j], rot.inverse(body.frames[j]))
         end = _bone_end(body, j)
-        known = body.upright or body.measured  # then flat feet agree in the sole, and spines in how they turn
-        if end is not None and j not in (0, HEAD) and not (known and j in (*SPINE, *FEET)):
+        # where the frames are known, flat feet agree in the sole, spines and collars in how they turn
+        if end is not None and j not in (0, HEAD) and not (body.known and j in (*SPINE, *FEET, *COLLARS)):
             along = rot.rotate(world[:, k], body.rest[end] - body.rest[j])
             world[:, k] = rot.multiply(_turn(along, pose.places[:, end] - pose.places[:, j]), world[:, k])
     return _straighten(world, body, pose.trunk)
