@@ -3,17 +3,22 @@
 Usage: python benchmarks/folded.py [--weights FILE] [--seeds 10] > benchmarks/folded.txt
 
 A person counts as folded where the pelvis is out of line with the trunk in more than a tenth of the frames, and as
-broken where any part of the body is (`motionloom.kinematics.wholeness`). Nothing is drawn again and no number read:
-it is what the network draws.
+broken where any part of the body is (`motionloom.kinematics.wholeness`). Shoulders are low where they rest further
+below the neck than any fitted person's; people whose arms hardly hang are not counted. Nothing is drawn again and no
+number read: it is what the network draws.
 """
 
 import argparse
 
-from motionloom.kinematics.wholeness import ENOUGH, broken_frames, wholeness
+import numpy as np
+
+from motionloom.kinematics.wholeness import ENOUGH, LOWEST_SHOULDERS, broken_frames, shoulders_below, wholeness
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 
+FEW = 10
+"""Frames with hanging arms that say where shoulders rest."""
 SENTENCES = (
     "a person stands still",
     "a person looks around",
@@ -65,15 +70,17 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10)
     given = parser.parse_args()
     prior = Prior.load(given.weights)
-    print(f"sentence | folded, of {given.seeds} | not whole")
-    sums = [0, 0]
+    print(f"sentence | folded, of {given.seeds} | not whole | low shoulders, of those whose arms hang")
+    sums = np.zeros(4, int)
     for text in SENTENCES:
         people = [generate(prior, text, seed=seed, literal=True)[0].positions() for seed in range(given.seeds)]
         folded = sum(broken_frames(body)["pelvis"].mean() > 1 - ENOUGH for body in people)
         broken = sum(wholeness(body) < ENOUGH for body in people)
-        sums = [sums[0] + folded, sums[1] + broken]
-        print(f"{text} | {folded} | {broken}", flush=True)
-    print(f"all {len(SENTENCES) * given.seeds} | {sums[0]} | {sums[1]}")
+        resting = [seen for body in people if len(seen := shoulders_below(body)) >= FEW]
+        low = sum(float(np.median(seen)) > LOWEST_SHOULDERS for seen in resting)
+        sums += [folded, broken, low, len(resting)]
+        print(f"{text} | {folded} | {broken} | {low} of {len(resting)}", flush=True)
+    print(f"all {len(SENTENCES) * given.seeds} | {sums[0]} | {sums[1]} | {sums[2]} of {sums[3]}")
     [(name, mark)] = weight_marks([find_weights(given.weights)]).items()
     print(f"\nWeights: {name} {mark}")
 

@@ -9,6 +9,7 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.io import load
+from motionloom.kinematics.wholeness import LOWEST_SHOULDERS, shoulders_below
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22, joints22, to_smpl22
 from motionloom.retarget.fidelity import compare
@@ -108,15 +109,6 @@ def test_takes_of_every_source_are_on_the_uniform_person_as_recorded(path: str, 
     agree(joints22(motion), to_smpl22(motion).positions())
 
 
-def below_the_neck(body: np.ndarray) -> np.ndarray:
-    """Centimetres from the neck down the trunk to the middle of the shoulders, of frames in which both arms hang."""
-    up = body[:, 12] - body[:, 0]
-    up = up / np.linalg.norm(up, axis=-1, keepdims=True)
-    shoulders, wrists = body[:, [16, 17]].mean(axis=1), body[:, [20, 21]]
-    hang = (((wrists - shoulders[:, None]) * up[:, None]).sum(axis=-1) < -0.25).all(axis=1)
-    return 100 * ((body[:, 12] - shoulders) * up).sum(axis=-1)[hang]
-
-
 WITHOUT_COLLARS = ("animated_drawings", "quaternius_robot")
 """Sources whose skeletons have no collar bones: their shoulders are where their arms begin."""
 
@@ -126,7 +118,7 @@ def test_shoulders_that_rest_are_where_a_persons_are(path: str, name: str, fps: 
     """Fitted people (accad, cmu, ui_prmd on the 22 joints) have them 6 to 10 cm below the neck joint."""
     place = shared(path)
     motion = load(place, fps=fps) if place.suffix == ".amc" else load(place)
-    seen = below_the_neck(to_smpl22(motion).positions())
+    seen = shoulders_below(to_smpl22(motion).positions())
     if len(seen) < 10 or name.startswith(WITHOUT_COLLARS):
         pytest.skip("arms never hang, or there are no collar bones")
-    assert 5 < np.median(seen) < 11
+    assert 0.05 < np.median(seen) < LOWEST_SHOULDERS - 0.01
