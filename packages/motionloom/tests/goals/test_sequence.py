@@ -55,6 +55,9 @@ SEQUENCES = {
     "crouching down first, then jumping up": ["a person crouches down", "a person jumps up"],
     "a person is directing traffic, then sits down": ["a person is directing traffic", "a person sits down"],
     "walk and stop": ["walk", "stop"],
+    "a person sits down, waits and gets up": ["a person sits down", "a person gets up"],
+    "a person stops and waits": ["a person stops", "a person waits"],
+    "a man walks to the sofa, lies down and sleeps": ["a man walks to the sofa", "a man lies down"],
     "a man walks, notices something, and runs away": ["a man walks", "a man notices something", "a man runs away"],
     "a person walks in, notices the dog and waves": [
         "a person walks in",
@@ -145,6 +148,10 @@ WHOLES = [
     "a person walks while waving",
     "a person walks, waving the left hand",
     "a person looks left and right",
+    "someone sits down on a chair and waits",
+    "a man lies down and goes to sleep",
+    "a dog sits down and remains seated",
+    "sit down, then wait for five seconds",
     "a person stands before a door",
     "a person runs after a ball",
     "a person waves now and then",
@@ -197,6 +204,11 @@ def test_more_takes_longer(shorter: str, longer: str) -> None:
 def test_seconds_in_words_are_taken() -> None:
     assert natural_seconds("a person waves for 7 seconds") == 7
     assert natural_seconds("a person waves for three seconds") == 3
+
+
+def test_a_posture_lasts_as_long_as_the_rest_that_follows_it() -> None:
+    assert [part.seconds for part in split_actions("a person sits down, waits for 8 seconds and gets up")] == [11, 3]
+    assert split_actions("a person sits down and waits")[0].seconds == 6
 
 
 def test_lengths_add_up_to_what_is_asked() -> None:

@@ -81,6 +81,13 @@ _COUNTED = re.compile(
 )
 _STOPS = re.compile(r"(?:stop|halt|pause)s?(?: (?:there|again|walking|moving))?", re.IGNORECASE)
 _WAITS = re.compile(r"\s*(?:wait|rest|remain|stay|pose|sleep)(?:s|ed|ing)?\b", re.IGNORECASE)
+_LASTS = re.compile(
+    _WAITS.pattern + r"|(?:relax|doze|nap)(?:es|s|ed|ing)?\b|(?:falls?|fell|falling) asleep\b"
+    r"|(?:goes?|went|going) to sleep\b|(?:does|do|did)(?:n't| not) move\b|keeps? (?:still|sitting|lying|kneeling)\b",
+    re.IGNORECASE,
+)
+"""Predicates of somebody who goes on being as they are."""
+_POSTURES = ("sit", "lie", "lay", "kneel", "crouch", "squat")
 _REPEATED = re.compile(
     r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ )?"
     r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
@@ -138,7 +145,28 @@ def split_actions(text: str) -> tuple[Part, ...]:
     if not 1 < len(parts) <= MOST_PARTS:
         return (Part(text, natural_seconds(text)),)
     last = len(parts) - 1
-    return tuple(Part(part, _briefly(part) if i < last else natural_seconds(part)) for i, part in enumerate(parts))
+    timed = [Part(part, _briefly(part) if i < last else natural_seconds(part)) for i, part in enumerate(parts)]
+    rested = _with_rests(timed)
+    return tuple(rested) if len(rested) > 1 else (Part(text, rested[0].seconds),)
+
+
+def _with_rests(parts: Sequence[Part]) -> list[Part]:
+    """Parts in which a posture lasts as long as the rest that is said to follow it: "sits down and waits"."""
+    found: list[Part] = []
+    for part in parts:
+        lasts = _LASTS.match(part.text.removeprefix(subject_of(part.text)).strip())
+        if lasts and found and _is_posture(found[-1].text):
+            both = found[-1].seconds + part.seconds
+            found[-1] = Part(found[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
+        else:
+            found.append(part)
+    return found
+
+
+def _is_posture(part: str) -> bool:
+    """Whether somebody ends up low and can stay so."""
+    done = part.removeprefix(subject_of(part)).strip()
+    return verb_of(done, mood_of(done)) in _POSTURES
 
 
 def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float = 20.0) -> list[float]:
