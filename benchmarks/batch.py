@@ -130,12 +130,11 @@ def _family(pids: list[int]) -> list[int]:
 
 def pure(rows: int, steps: int, weights: str) -> None:
     """Draw and solve rows of 4 s in this process when a line comes in; say the seconds of it."""
-    import torch
-
+    from motionloom.runtime import set_threads
     from motionloom.tasks.text import finish, frames_in, sample_features
     from motionloom.weights.prior import Prior
 
-    torch.set_num_threads(1)
+    set_threads(1)
     prior = Prior.load(weights)
     frames = frames_in(4.0, prior.fps)
 
@@ -170,16 +169,15 @@ def pure_rate(processes: int, rows: int, steps: int, weights: str) -> float:
 
 def profile(rows: int, steps: int, weights: str) -> None:
     """Print the processor seconds per motion of one process, by what it does."""
-    import torch
-
     from motionloom.bulk import maker as bulk
     from motionloom.bulk.maker import Maker, Options
     from motionloom.bulk.row import parse
     from motionloom.bulk.shard import entry_of
     from motionloom.bulk.writers import writer
+    from motionloom.runtime import set_threads
     from motionloom.tasks import text
 
-    torch.set_num_threads(1)
+    set_threads(1)
     spent: dict[str, float] = {}
 
     def timed(name: str, function: Callable[..., Any]) -> Callable[..., Any]:

@@ -17,7 +17,6 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
@@ -25,6 +24,7 @@ from motionloom.io import load
 from motionloom.io.bvh import save_bvh
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
+from motionloom.runtime import set_threads
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior
 
@@ -106,7 +106,7 @@ def assimp(files: list[Path], library: Path) -> list[dict[str, np.ndarray]]:
 
 def walk() -> Motion:
     """Two seconds of the shipped prior."""
-    torch.set_num_threads(1)
+    set_threads(1)
     return generate(Prior.load("default"), "a person walks forward and waves", seconds=2.0, seed=1)[0]
 
 

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from motionloom.features.layout import FEET, FPS
 from motionloom.goals.segment import Segment
@@ -32,6 +31,7 @@ from motionloom.live.live import Live, motion_of
 from motionloom.live.pair import LivePair
 from motionloom.live.sessions import Session, Sessions
 from motionloom.live.socket import live_session
+from motionloom.runtime.session import threads
 from motionloom.tasks.long import compose
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -423,7 +423,7 @@ def main() -> None:
     arguments = parser.parse_args()
     minutes = arguments.minutes if arguments.hours is None else 60 * arguments.hours
     prior = Prior.load(arguments.weights)
-    result: dict[str, Any] = {"threads": torch.get_num_threads()}
+    result: dict[str, Any] = {"threads": threads()}
     for part in arguments.parts or PARTS:
         result[part] = PARTS[part](prior, arguments.seeds, minutes)
         print(json.dumps({part: result[part]}, indent=1), flush=True)
