@@ -74,7 +74,7 @@ def test_help_is_quick() -> None:
     )
     done = run("-c", code)
     assert done.returncode == 0, done.stderr
-    assert "LOADED ['motionloom'] ['cli', 'errors', 'formats', 'interruption', 'requests']" in done.stdout
+    assert "LOADED ['motionloom'] ['cli', 'errors', 'formats', 'interruption', 'reading', 'requests']" in done.stdout
 
 
 CLOCKS = {"perf_counter", "perf_counter_ns", "monotonic", "monotonic_ns", "process_time", "thread_time", "getrusage"}
@@ -278,3 +278,30 @@ def test_a_batch_and_the_server_draw_without_torch(tmp_path: Path) -> None:
     )
     done = run("-c", code)
     assert done.returncode == 0, done.stderr
+
+
+UNCLEAR = {
+    *("asked", "begun", "drawn", "found", "given", "guesses", "heard", "kept", "made", "said", "seen", "settled"),
+    *("stands", "taken", "told", "wanted", "wish"),
+}
+"""Names of functions that do not say what they return: a value is a noun, a function a verb."""
+CLEAR_ROOMS = ("bulk", "cli", "io", "robots", "server", "viz")
+"""Rooms of the product in which no function has such a name; of the other packages no room has one."""
+
+
+def _is_clear_room(path: Path) -> bool:
+    package, room = path.relative_to(PACKAGES).parts[0], path.relative_to(PACKAGES).parts[3]
+    return package != "motionloom" or room in CLEAR_ROOMS
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in FILES if PACKAGES in path.parents and _is_clear_room(path)],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_functions_say_what_they_return(path: Path) -> None:
+    """Functions inside of functions aside, which only their own lines call."""
+    tree = ast.parse(path.read_text())
+    bodies = [tree.body, *(node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef))]
+    functions = [n.name for body in bodies for n in body if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    assert not [name for name in functions if name.strip("_") in UNCLEAR]

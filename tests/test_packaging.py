@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.cli.commands import GROUP, OTHERS
+from motionloom.cli.commands import FAMILIES, GROUP, OTHERS
+from motionloom.reading import read_table
 
 ROOT = Path(__file__).parents[1]
 BUILD = runpy.run_path(str(ROOT / "setup.py"), run_name="setup")
@@ -268,3 +269,20 @@ def test_every_source_of_a_weight_file_is_named_in_its_card_and_in_the_notice(fi
     for page in (ROOT / "NOTICE", WEIGHTS / f"{CARDS.get(file.stem, file.stem)}.md"):
         text = page.read_text().lower()
         assert not [source for source in named if source.lower() not in text], f"{page.name} does not name them"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_families_name_the_commands_of_their_tables(family: str) -> None:
+    """So that only the table is read that has the command of the line."""
+    assert list(read_table("motionloom.cli", f"{family}.toml")) == FAMILIES[family]
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_tables_are_in_the_wheels(name: str) -> None:
+    """Every file of data beside the modules is one that setuptools is asked to take along."""
+    asked = tomllib.loads((PACKAGES[name] / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]
+    [(package, patterns)] = asked.items()
+    source = ROOT / "packages" / name / "src" / package
+    taken = {path for pattern in patterns for path in source.glob(pattern)}
+    data = {path for kind in ("toml", "yaml", "json") for path in source.rglob(f"*.{kind}")}
+    assert not {str(path.relative_to(source)) for path in data - taken if "page" not in path.parts}

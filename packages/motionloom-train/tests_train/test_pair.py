@@ -16,7 +16,7 @@ from motionloom_train.duets import KEEN, NEAR, Duets, Sight
 from motionloom_train.modules import prior_module
 from motionloom_train.nets.pair import PairNet, Talk, other, part
 from motionloom_train.objectives import WEIGHTS
-from motionloom_train.pair import BEGUN, Drawn, Held, PairError, Parts, Settings, _over_rows, given_slots, held_out
+from motionloom_train.pair import BEGUN, Drawn, Held, PairError, Parts, Settings, _over_rows, held_out, known_slots
 from motionloom_train.tensors import noised, tensor
 from tests.kinematics import people
 from tests.recorded import tiny
@@ -127,7 +127,7 @@ def test_recordings_are_drawn_by_the_root_of_their_length_and_windows_begin_anyw
 
 def test_windows_are_as_long_as_often_as_the_recipe_says():
     made = objective(windows=[20, 32], shares=[3.0, 1.0])
-    found = [made.drawn(5, step, 1).clean.shape[1] - 1 for step in range(80)]
+    found = [made.sample(5, step, 1).clean.shape[1] - 1 for step in range(80)]
     assert set(found) == {20, 32}
     assert np.mean([one == 20 for one in found]) == pytest.approx(0.75, abs=0.13)
 
@@ -143,7 +143,7 @@ def test_a_beginning_gives_both_people_and_d_and_a_reaction_one_person_without_d
     begun = np.array([True] * 300 + [False] * 200)
     react = np.array([False] * 300 + [True] * 100 + [False] * 100)
     lengths = np.array([80] * 400 + [30] * 100)
-    given = given_slots(np.random.default_rng(0), begun, react, lengths, 80).reshape(500, 2, 81)
+    given = known_slots(np.random.default_rng(0), begun, react, lengths, 80).reshape(500, 2, 81)
     counts = given[:300].sum(-1)
     assert (counts[:, 0] == counts[:, 1]).all()
     assert given[:300, :, 0].all()
@@ -156,28 +156,28 @@ def test_a_beginning_gives_both_people_and_d_and_a_reaction_one_person_without_d
     assert (given[300:400].sum((1, 2)) == 80).all()
     assert 20 < given[300:400, 0, 1].sum() < 80
     assert not given[400:].any()
-    short = given_slots(np.random.default_rng(0), begun, react, np.full(500, 30), 80).reshape(500, 2, 81)
+    short = known_slots(np.random.default_rng(0), begun, react, np.full(500, 30), 80).reshape(500, 2, 81)
     assert short[:300].sum(-1).max() == 16
     assert not short[..., 31:].any()
 
 
 def test_given_slots_have_no_noise_and_both_people_one_level_and_own_noise():
     made, watch = objective(settings=Settings(prefix=0.5, react=0.5)), Watch()
-    drawn = made.drawn(1, 2, 8)
+    drawn = made.sample(1, 2, 8)
     made.denoised(watch, drawn)
     signal = tensor(made.schedule.signal)[drawn.level].float()
     still = watch.state - signal[:, None, None] * drawn.clean
     assert still[drawn.given].abs().max() < 1e-6 < 0.01 < still[~drawn.given].abs().mean()
     assert torch.equal(drawn.level[0::2], drawn.level[1::2])
     assert (drawn.noise[0::2] - drawn.noise[1::2]).abs().mean() > 0.5
-    again, later = made.drawn(1, 2, 8), made.drawn(1, 3, 8)
+    again, later = made.sample(1, 2, 8), made.sample(1, 3, 8)
     assert torch.equal(again.noise, drawn.noise)
     assert not torch.equal(later.level, drawn.level)
 
 
 def test_texts_are_dropped_for_both_people_alike_and_early_levels_are_noisy():
     made = objective(settings=Settings(prefix=0.4, react=0.1, silent=0.5, early=1.0), windows=[20], shares=[1.0])
-    drawn = made.drawn(0, 0, 300)
+    drawn = made.sample(0, 0, 300)
     silent = drawn.cond.pooled.abs().sum(-1) == 0
     assert torch.equal(silent[0::2], silent[1::2])
     given = drawn.given.any(1)[0::2] | drawn.given.any(1)[1::2]
@@ -186,7 +186,7 @@ def test_texts_are_dropped_for_both_people_alike_and_early_levels_are_noisy():
     assert drawn.level.min() >= 1
     assert drawn.level.max() == 50
     assert (drawn.level > 37).float().mean() == pytest.approx(0.5, abs=0.09)  # 1 - sqrt(1/4) of them
-    even = objective(settings=Settings(early=0.0)).drawn(0, 0, 300)
+    even = objective(settings=Settings(early=0.0)).sample(0, 0, 300)
     assert (even.level > 37).float().mean() == pytest.approx(0.25, abs=0.09)
 
 
@@ -195,7 +195,7 @@ def test_texts_are_dropped_for_both_people_alike_and_early_levels_are_noisy():
 
 def test_a_fresh_block_costs_what_the_prior_alone_costs_and_the_square_of_d():
     made = objective(fresh=True, settings=Settings(prefix=0.0, react=0.0))
-    drawn = made.drawn(3, 4, 4)
+    drawn = made.sample(3, 4, 4)
     parts = made.parts(made.denoised(made.net.eval(), drawn), drawn)
     prior, motion = tiny.prior(), drawn.clean[:, 1:]
     state = noised(prior.schedule, motion, drawn.level, drawn.noise[:, 1:])
@@ -210,7 +210,7 @@ def test_a_fresh_block_costs_what_the_prior_alone_costs_and_the_square_of_d():
 @pytest.mark.parametrize("said", [Settings(dropout=0.0), Settings(dropout=0.0, aware=True)], ids=["plain", "aware"])
 def test_exchanged_people_cost_the_same(said):
     made = objective(settings=said)
-    drawn = made.drawn(3, 4, 4)
+    drawn = made.sample(3, 4, 4)
     exchanged = Drawn(*(other(x) for x in drawn[:4]), drawn.cond, drawn.lengths)
     assert not torch.equal(exchanged.clean, drawn.clean)
     before, after = (made.parts(made.denoised(made.net.eval(), d), d) for d in (drawn, exchanged))
@@ -220,7 +220,7 @@ def test_exchanged_people_cost_the_same(said):
 
 def test_what_is_given_and_what_lies_behind_the_end_costs_nothing():
     made = objective(settings=Settings(prefix=1.0, react=0.0), windows=[80], shares=[1.0])
-    drawn = made.drawn(0, 0, 3)
+    drawn = made.sample(0, 0, 3)
     assert (drawn.lengths < 80).all()
     denoised = made.denoised(made.net.eval(), drawn)
     wrong = denoised.clone()
@@ -254,7 +254,7 @@ def test_what_they_see_of_each_other_is_that_of_the_world_and_counts_by_how_litt
     away = sight.error(moved, features, places, features)
     near = np.exp(-0.5 * (seen**2).sum(-1).numpy() / NEAR**2)
     np.testing.assert_allclose(away.numpy(), 0.09 * (1 + 4 * near).mean((-1, -2)), rtol=1e-6)
-    drawn = made.drawn(0, 1, 2)
+    drawn = made.sample(0, 1, 2)
     denoised, low = made.denoised(made.net.eval(), drawn), drawn._replace(level=torch.ones_like(drawn.level))
     high = drawn._replace(level=torch.full_like(drawn.level, 50))
     faint = made.settings.faint  # what is left of it near pure noise
@@ -281,7 +281,7 @@ def test_the_numbers_of_a_frame_count_as_in_training_one_person():
 
 def test_being_wrong_by_one_everywhere_costs_one_however_much_is_given():
     made = objective(settings=Settings(prefix=0.5, react=0.5))
-    drawn = made.drawn(3, 4, 8)
+    drawn = made.sample(3, 4, 8)
     assert made.parts(drawn.clean, drawn).displacement < 1e-9
     parts = made.parts(drawn.clean + 1.0, drawn)
     assert float(parts.motion) == pytest.approx(1.0, abs=1e-4)
@@ -305,7 +305,7 @@ def test_windows_near_the_end_are_shorter_and_held_out_ones_are_spread_over_pair
 def test_partners_held_out_are_off_by_metres_where_nothing_is_given(monkeypatch):
     """Who is told sees the other 0.6 m beside where he is, who is not 0.3 m."""
     made = objective(settings=Settings(prefix=0.0, react=1.0))
-    drawn = made.drawn(3, 4, 3)
+    drawn = made.sample(3, 4, 3)
     drawn = drawn._replace(lengths=torch.full_like(drawn.lengths, drawn.clean.shape[1] - 1))
     given = drawn.given[:, 1]
     assert given.sum() == 3
@@ -325,7 +325,7 @@ def test_parts_of_the_loss_have_their_weights():
 def test_a_wrong_guess_of_where_they_stand_is_seen_by_both_even_by_whom_nothing_is_left_to_guess():
     """One person is given; the other sees, and is seen, elsewhere."""
     made = objective(settings=Settings(prefix=0.0, react=1.0))
-    drawn = made.drawn(3, 4, 2)._replace(level=torch.full((4,), 1))
+    drawn = made.sample(3, 4, 2)._replace(level=torch.full((4,), 1))
     assert made.parts(drawn.clean, drawn).sight < 1e-9
     wrong = drawn.clean.clone()
     wrong[:, 0, 2] += torch.tensor([0.1, 0.2, 0.4, 0.8]) / made.net.talk.config.places.ground
@@ -340,7 +340,7 @@ def test_a_wrong_guess_of_where_they_stand_is_seen_by_both_even_by_whom_nothing_
 
 def test_texts_are_dropped_of_who_reacts_too_and_of_whom_nobody_described():
     made = objective(settings=Settings(prefix=0.0, react=1.0, silent=1.0), windows=[20], shares=[1.0])
-    assert made.drawn(0, 0, 20).cond.pooled.abs().sum() == 0
+    assert made.sample(0, 0, 20).cond.pooled.abs().sum() == 0
     undescribed = PairError(
         made.net,
         tiny.prior(),

@@ -36,7 +36,7 @@ def test_frames_beyond_what_people_do_are_counted_and_too_many_fail() -> None:
 
     def elbows(share: float) -> bodies.BodyNumber:
         degrees = np.where(np.arange(1000) < 1000 * share, 120.0, 50.0)
-        return next(row for row in bodies.held([with_elbows(degrees)], reach) if row.name == "elbows")
+        return next(row for row in bodies.compare_bodies([with_elbows(degrees)], reach) if row.name == "elbows")
 
     assert (elbows(0.02).outside, elbows(0.02).passes) == (0.02, True)
     assert (elbows(0.04).outside, elbows(0.04).passes) == (0.04, False)
@@ -44,7 +44,7 @@ def test_frames_beyond_what_people_do_are_counted_and_too_many_fail() -> None:
 
 def test_a_median_that_few_people_have_fails_though_no_frame_is_impossible() -> None:
     reach = bodies.reach_of([with_elbows(np.linspace(0, 100, 1001))])
-    row = next(r for r in bodies.held([with_elbows(np.full(100, 97.0))], reach) if r.name == "elbows")
+    row = next(r for r in bodies.compare_bodies([with_elbows(np.full(100, 97.0))], reach) if r.name == "elbows")
     assert (row.outside, row.passes) == (0.0, False)
 
 

@@ -32,8 +32,8 @@ def test_bounds_include_their_ends_and_say_what_they_want() -> None:
     assert both.holds({"turn": 300.0})
     assert not both.holds({"turn": 44.9})
     assert not both.holds({"turn": float("nan")})
-    assert both.wanted() == "turn >= 45 and <= 300"
-    assert Bound("turn", high=3.0).wanted() == "turn <= 3"
+    assert both.text() == "turn >= 45 and <= 300"
+    assert Bound("turn", high=3.0).text() == "turn <= 3"
 
 
 @pytest.mark.parametrize(

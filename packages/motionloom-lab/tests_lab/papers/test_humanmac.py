@@ -15,11 +15,11 @@ from motionloom_lab.papers.humanmac import (
     PARTS,
     Fixed,
     SwitchTarget,
+    conditioned_samples,
     padded,
     published_completion,
     published_futures,
     published_levels,
-    told_samples,
 )
 from motionloom_train.nets.predictor import TransLinear
 from tests.noise import normal
@@ -161,14 +161,18 @@ def test_a_target_longer_than_the_window_is_refused() -> None:
 
 @pytest.mark.parametrize(("count", "share", "told"), [(50, 0.5, 25), (50, 1.0, 50), (50, 0.0, 0), (10, 0.26, 3)])
 def test_a_share_of_the_samples_is_conditioned_the_first_ones(count: int, share: float, told: int) -> None:
-    assert told_samples(count, share) == [True] * told + [False] * (count - told)
+    assert conditioned_samples(count, share) == [True] * told + [False] * (count - told)
 
 
 def test_the_published_coin_falls_as_often_as_asked() -> None:
-    assert sum(told_samples(4000, 0.3, coin=1)) == pytest.approx(1200, abs=4 * (4000 * 0.21) ** 0.5)
-    assert told_samples(50, 0.5, coin=1) == told_samples(50, 0.5, coin=1) != told_samples(50, 0.5, coin=2)
-    assert all(told_samples(50, 1.0, coin=3))
-    assert not any(told_samples(50, 0.0, coin=3))
+    assert sum(conditioned_samples(4000, 0.3, coin=1)) == pytest.approx(1200, abs=4 * (4000 * 0.21) ** 0.5)
+    assert (
+        conditioned_samples(50, 0.5, coin=1)
+        == conditioned_samples(50, 0.5, coin=1)
+        != conditioned_samples(50, 0.5, coin=2)
+    )
+    assert all(conditioned_samples(50, 1.0, coin=3))
+    assert not any(conditioned_samples(50, 0.0, coin=3))
 
 
 # Futures of a predictor

@@ -103,10 +103,10 @@ def test_what_is_given_is_what_the_protocol_says(given: str, frames: int, sees: 
     crop = couple(6.0)[:, : FRAMES + 1]
     other = crop.copy()
     other[:, sees:] += 1.0
-    assert np.array_equal(ways.seen(crop, given), ways.seen(other, given))
-    assert len(two.encode(ways.seen(crop, given)).features[0]) == frames
+    assert np.array_equal(ways.visible_part(crop, given), ways.visible_part(other, given))
+    assert len(two.encode(ways.visible_part(crop, given)).features[0]) == frames
     other[:, sees - 1] += 0.1
-    assert not np.array_equal(ways.seen(crop, given), ways.seen(other, given))
+    assert not np.array_equal(ways.visible_part(crop, given), ways.visible_part(other, given))
 
 
 class Oracle:
@@ -127,7 +127,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
     positions = couple(6.0) + np.array([0.0, 0.3, 0.0])  # features call their lowest point 0, the world does not
     crops, prior = crops_of(positions), tiny.prior()
     oracle, net = Oracle(crops), ways.no_communication_net(tiny.prior())
-    way = ways.drawn(prior, net, given=given, steps=4, make=oracle)
+    way = ways.sampled(prior, net, given=given, steps=4, make=oracle)
     found = duet.score(crops, way, 1)
     assert max(float(np.abs(found[name]).max()) for name in ERRORS) < 1e-4
     asked = oracle.asked[0]
@@ -145,7 +145,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
 def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
     crops, prior = crops_of(couple(6.0), 4), tiny.prior()
     oracle = Oracle(crops)
-    way = ways.drawn(prior, ways.no_communication_net(prior), steps=4, make=oracle)
+    way = ways.sampled(prior, ways.no_communication_net(prior), steps=4, make=oracle)
     way(crops, 0), way(crops.part(slice(2, 4)), 0), way(crops, 1)
     whole, part, again = (asked["seeds"] for asked in oracle.asked)
     assert whole[4:] == part
@@ -154,7 +154,7 @@ def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
 
 def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
     crops, prior = crops_of(couple(6.0), 2), tiny.prior()
-    made = ways.drawn(prior, ways.no_communication_net(prior), steps=2)(crops, 0)
+    made = ways.sampled(prior, ways.no_communication_net(prior), steps=2)(crops, 0)
     assert made.shape == (2, 2, FRAMES, 22, 3)
     np.testing.assert_allclose(made[:, :, :20], crops.positions[:, :, :20], atol=2e-3)
     assert np.isfinite(made).all()
@@ -303,7 +303,7 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
         f"known: 1 layer after layer {last}",
     ]
     assert found[0].digest == weights_digest(files[0])[:12]  # graphs do not count
-    silent = ways.drawn(prior, ways.no_communication_net(prior), steps=2)
+    silent = ways.sampled(prior, ways.no_communication_net(prior), steps=2)
     made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))
     np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
 

@@ -80,7 +80,7 @@ def test_futures_of_similar_pasts_are_counted_among_all_windows_whichever_are_me
 def test_how_many_windows_go_at_a_time_changes_nothing(trial: trials.PredictionTrial) -> None:
     tiny = predictor()
     for way in (
-        prediction.drawn(tiny, 0, samples=3, steps=2),
+        prediction.sampled(tiny, 0, samples=3, steps=2),
         prediction.as_published(tiny, 0, samples=3, steps=3),
     ):
         one, all_ = (trials.score(trial, way, samples=3, chunk=chunk) for chunk in (1, 100))

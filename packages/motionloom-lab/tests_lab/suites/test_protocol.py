@@ -88,7 +88,7 @@ def test_described_says_whatever_changes_a_number() -> None:
 
 def test_what_a_resumed_run_must_agree_in_leaves_out_only_how_long_it_runs() -> None:
     """A run of more replications or step counts goes on from a shorter one."""
-    assert Protocol().drawn().keys() ^ Protocol.__dataclass_fields__.keys() == {"steps", "replications"}
+    assert Protocol().sampling().keys() ^ Protocol.__dataclass_fields__.keys() == {"steps", "replications"}
 
 
 def test_a_quick_run_is_one_batch_twice() -> None:

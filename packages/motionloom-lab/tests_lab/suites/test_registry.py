@@ -69,7 +69,7 @@ def test_a_killed_run_goes_on_with_the_next_suite(job: Job, tmp_path: Path) -> N
     second.stops = False
     outcomes = run_all(job, tmp_path / "out", [first.suite(), second.suite()])
     assert (first.runs, second.runs) == (1, 1)
-    assert [one.said.split(":")[0] for one in outcomes] == ["kept", "measured"]
+    assert [one.summary.split(":")[0] for one in outcomes] == ["kept", "measured"]
     assert [one.report and one.report.suite for one in outcomes] == ["first", "second"]
 
 
@@ -88,7 +88,7 @@ def test_a_kill_between_report_and_mark_is_measured_again(
         with pytest.raises(KeyboardInterrupt):
             run_all(replace(job, quick=True), tmp_path / "out", [one.suite()], again=True)
     (outcome,) = run_all(job, tmp_path / "out", [one.suite()])
-    assert outcome.said == "measured"
+    assert outcome.summary == "measured"
     assert outcome.report
     assert outcome.report.protocol["n"] == 10
 
@@ -141,7 +141,7 @@ def test_a_suite_without_its_data_is_skipped_and_a_failing_one_stops_no_other(jo
 
     bad, good = replace(Counted("bad").suite(), run=fails), Counted("good")
     outcomes = run_all(job, tmp_path / "out", [Counted("hungry").suite("needed"), bad, good.suite()])
-    assert [(one.said.split(":")[0], one.failed) for one in outcomes] == [
+    assert [(one.summary.split(":")[0], one.failed) for one in outcomes] == [
         ("skipped", False),
         ("failed", True),
         ("measured", False),
@@ -159,8 +159,8 @@ def test_a_suite_whose_kind_of_data_is_not_there_is_skipped_and_asked_again(job:
 
     outcomes = run_all(job, out, [pairs, replace(Counted("later").suite("used"), run=none)])
     assert [(one.state, one.failed, one.report) for one in outcomes] == [("skipped", False, None)] * 2
-    assert "no recordings of two people" in outcomes[0].said
-    assert outcomes[1].said == "skipped: there is no held-out pair"
+    assert "no recordings of two people" in outcomes[0].summary
+    assert outcomes[1].summary == "skipped: there is no held-out pair"
     (tmp_path / "set" / "x_a.bvh").write_text("")
     assert [one.state for one in run_all(job, out, [pairs])] == ["measured"]
     assert [one.state for one in run_all(job, out, [replace(pairs, needs=never)])] == ["kept"]
@@ -239,7 +239,7 @@ def test_a_quick_run_is_marked_and_never_replaces_a_full_one_unless_asked(job: J
         run_all(quick, out, [one.suite()])
     with pytest.raises(MotionloomError, match=r"kept.*full run"):
         run_all(quick, tmp_path / "elsewhere", [one.suite()], keep=tmp_path / "kept")
-    assert run_all(quick, out, [one.suite()], again=True)[0].said == "measured"
+    assert run_all(quick, out, [one.suite()], again=True)[0].summary == "measured"
 
 
 def test_missing_weights_are_reported_before_anything_runs(job: Job, tmp_path: Path) -> None:

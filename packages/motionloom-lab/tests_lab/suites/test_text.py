@@ -156,7 +156,7 @@ def test_captions_of_published_length_are_read_beside_generated_motions_only() -
 
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_stopped(tmp_path: Path) -> None:
     whole = text.measure(trial(Painter(0.3)), memory=lambda steps: 100.0 + steps)
-    parts = Parts(tmp_path, fingerprint(SMALL.drawn()))
+    parts = Parts(tmp_path, fingerprint(SMALL.sampling()))
     with pytest.raises(KeyboardInterrupt):
         text.measure(trial(Painter(0.3, stop_after=3)), parts=parts)
     second = Painter(0.3)
@@ -174,13 +174,13 @@ def _timeless(found: Report) -> str:
 
 
 def test_more_replications_go_on_from_fewer_and_other_settings_do_not(tmp_path: Path) -> None:
-    text.measure(trial(Painter()), parts=Parts(tmp_path, fingerprint(SMALL.drawn())))
+    text.measure(trial(Painter()), parts=Parts(tmp_path, fingerprint(SMALL.sampling())))
     more, painter = replace(SMALL, replications=4, steps=(2, 4, 6)), Painter()
-    text.measure(trial(painter, more), parts=Parts(tmp_path, fingerprint(more.drawn())))
+    text.measure(trial(painter, more), parts=Parts(tmp_path, fingerprint(more.sampling())))
     assert len(painter.calls) == 2 + 4 + 2
     other = replace(SMALL, seed=1)
     with pytest.raises(MotionloomError, match="other settings"):
-        text.measure(trial(Painter(), other), parts=Parts(tmp_path, fingerprint(other.drawn())))
+        text.measure(trial(Painter(), other), parts=Parts(tmp_path, fingerprint(other.sampling())))
 
 
 @pytest.mark.parametrize("damage", ["", "[]", "{}", '{"settings": "x", "numbers": {"r1": NaN}}', '{"settings": 3'])

@@ -53,7 +53,7 @@ class ControlledError(CleanError):
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`; ``net`` is a wrapped `Shown`."""
-        drawn = self.drawn(seed, step, rows)
+        drawn = self.sample(seed, step, rows)
         if self.early:
             even = drawn.level.double() / self.schedule.steps
             drawn = drawn._replace(level=(self.schedule.steps * (1 - (1 - even) ** 2)).round().long())

@@ -142,7 +142,7 @@ class CleanError:
         """See `motionloom_train.captured.Capturable`."""
         return int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0])
 
-    def drawn(self, seed: int, step: int, rows: int) -> Drawn:
+    def sample(self, seed: int, step: int, rows: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
         window, picked = self.pick(seed, step, rows)
         return self._noised(window, picked.to(self.device), self._generator(seed, step))
@@ -153,12 +153,12 @@ class CleanError:
     def _noised(self, window: int, picked: Tensor, generator: torch.Generator) -> Drawn:
         batch: Batch = self.batches.show(window, picked)
         rows = len(batch.lengths)
-        level = self.drawn_levels(rows, generator)
+        level = self.random_levels(rows, generator)
         noise = torch.randn(batch.features.shape, generator=generator, device=self.device)
         keep = torch.rand(rows, generator=generator, device=self.device) >= self.drop_text
         return Drawn(batch.features, level, noise, self.words.condition(batch.texts, batch.lengths).choose(keep))
 
-    def drawn_levels(self, rows: int, generator: torch.Generator) -> Tensor:
+    def random_levels(self, rows: int, generator: torch.Generator) -> Tensor:
         """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
         how: dict[str, Any] = {"generator": generator, "device": generator.device}
         level = torch.randint(1, self.schedule.steps + 1, (rows,), **how)

@@ -66,7 +66,7 @@ class Settings:
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values out of range."""
-        made = parse_table(Settings, "pair", values)
+        made = parse_table(Settings, "[pair]", values)
         shares = (made.prefix, made.react, made.prefix + made.react, made.silent, made.early, made.faint)
         if not all(0 <= share <= 1 for share in shares) or not all(0 <= w <= 1e3 for w in (made.place, made.sight)):
             raise MotionloomError("[pair] prefix, react, silent, early and faint are shares, place and sight weights")
@@ -124,10 +124,10 @@ class PairError:
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`; rows: pairs."""
-        drawn = self.drawn(seed, step, rows)
+        drawn = self.sample(seed, step, rows)
         return self.total(self.parts(self.denoised(net, drawn), drawn))
 
-    def drawn(self, seed: int, step: int, pairs: int) -> Drawn:
+    def sample(self, seed: int, step: int, pairs: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone."""
         rng = np.random.default_rng((seed, step))
         windows = self.recipe.windows
@@ -140,7 +140,7 @@ class PairError:
         frames = crops.features.shape[2]
         kind = rng.random(pairs)
         begun, react = kind < said.prefix, (kind >= said.prefix) & (kind < said.prefix + said.react)
-        given = given_slots(rng, begun, react, crops.lengths, frames)
+        given = known_slots(rng, begun, react, crops.lengths, frames)
         dropped = np.where(begun | react, said.silent, self.recipe.drop_text)
         keep = (rng.random(pairs) >= dropped) & (crops.texts > 0)
         at = rng.random(pairs)
@@ -194,7 +194,7 @@ def _over_rows(error: Tensor, free: Tensor) -> Tensor:
     return mean.sum() / (count > 0).sum().clamp(min=1)
 
 
-def given_slots(
+def known_slots(
     rng: np.random.Generator, begun: np.ndarray, react: np.ndarray, lengths: np.ndarray, frames: int
 ) -> np.ndarray:
     """(2 * pairs, 1 + frames) bool, what is given: D and a beginning of 10 to 40 frames (half of the time 20, and at

@@ -61,7 +61,7 @@ class Settings:
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values of the wrong kind."""
-        settings = parse_table(Settings, "predictor", values)
+        settings = parse_table(Settings, "[predictor]", values)
         shares = 0 <= settings.condition_dropout < 1 and 0 <= settings.smoothed <= 1
         if settings.variant not in ("published", "masked") or not shares:
             raise MotionloomError(

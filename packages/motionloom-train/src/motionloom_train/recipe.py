@@ -3,7 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_origin, get_type_hints
 
@@ -104,18 +104,7 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
         raise MotionloomError(f"{path} is not TOML: {error}") from None
     values = _merged(values, changes or {})
     _check_whole_numbers(path, values)
-    hints = get_type_hints(Recipe)
-    for key, value in values.items():
-        if key not in hints:
-            raise MotionloomError(
-                f"{path}: no setting {key!r}; the settings are {', '.join(f.name for f in fields(Recipe))}"
-            )
-        kind = getattr(hints[key], "__origin__", hints[key])
-        if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            values[key] = float(value)
-        elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise MotionloomError(f"{path}: {key} must be of kind {kind.__name__}; got {_shown(value)}")
-    recipe = Recipe(**values)
+    recipe = parse_table(Recipe, f"{path}:", values)
     _check(path, recipe)
     return recipe
 
@@ -123,21 +112,23 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
 Table = TypeVar("Table")
 
 
-def parse_table(kind: type[Table], name: str, values: dict[str, Any]) -> Table:
-    """Settings of a dataclass from a recipe's table of that name.
+def parse_table(kind: type[Table], place: str, values: Mapping[str, Any]) -> Table:
+    """Settings of a dataclass from a recipe or one of its tables; ``place``: its name in messages, such as ``[net]``.
 
     Raises MotionloomError for a setting there is not, and for a value of the wrong kind; words are checked by whoever
     knows which there are.
     """
-    hints = get_type_hints(kind)
+    hints, found = get_type_hints(kind), dict(values)
     for key, value in values.items():
         if key not in hints:
-            raise MotionloomError(f"[{name}] has no setting {key!r}; the settings are {', '.join(hints)}")
-        wanted = str if get_origin(hints[key]) is Literal else hints[key]
+            raise MotionloomError(f"{place} no setting {key!r}; the settings are {', '.join(hints)}")
+        origin = get_origin(hints[key])
+        wanted = str if origin is Literal else origin or hints[key]
         fits = isinstance(value, (int, float) if wanted is float else wanted)
         if not fits or (wanted is not bool and isinstance(value, bool)):
-            raise MotionloomError(f"[{name}] {key} must be of kind {wanted.__name__}; got {value!r}")
-    return kind(**values)
+            raise MotionloomError(f"{place} {key} must be of kind {wanted.__name__}; got {_shown(value)}")
+        found[key] = float(value) if wanted is float else value
+    return kind(**found)
 
 
 LIMITS: Mapping[str, float] = {

@@ -48,7 +48,7 @@ def test_a_stretch_is_played_back_and_forth_without_a_jump() -> None:
 
 def test_a_standing_end_goes_on_with_a_recording_in_its_place_and_direction() -> None:
     body, idle = people.standing(2.0), Idle((living(turned=1.3),))
-    longer = augment.held(body, 20, 60, fps=FPS, seed=1, idle=idle)
+    longer = augment.with_pauses(body, 20, 60, fps=FPS, seed=1, idle=idle)
     assert len(longer) == len(body) + 80
     np.testing.assert_array_equal(longer[20 : 20 + len(body)], body)
     assert np.linalg.norm(longer[:, [7, 8], ::2] - body[0, [7, 8], ::2], axis=-1).max() < 0.05
@@ -61,7 +61,7 @@ def test_a_pose_in_which_nobody_stands_is_held_and_sways_as_recorded() -> None:
     sitting, idle = people.standing(2.0), Idle((living(),))
     sitting[:, [k for k in range(22) if k not in (7, 8, 10, 11)], 1] -= 0.45
     assert not augment.stands_on(sitting[-1], idle)
-    longer = augment.held(sitting, 0, 60, fps=FPS, seed=1, idle=idle)
+    longer = augment.with_pauses(sitting, 0, 60, fps=FPS, seed=1, idle=idle)
     tail = longer[len(sitting) :]
     assert np.abs(tail - sitting[-1]).max() < 0.12
     assert np.ptp(tail[:, 15, 0]) > 0.01

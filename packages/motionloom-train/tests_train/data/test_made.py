@@ -56,7 +56,7 @@ def test_lowered_arms_hang_below_the_chest() -> None:
 
 def test_held_poses_go_on_from_the_clip_and_keep_what_is_on_the_floor() -> None:
     body = people.standing(2.0)
-    longer = augment.held(body, 30, 50, fps=20.0, seed=1)
+    longer = augment.with_pauses(body, 30, 50, fps=20.0, seed=1)
     assert len(longer) == len(body) + 80
     np.testing.assert_array_equal(longer[30 : 30 + len(body)], body)
     jumps = np.linalg.norm(np.diff(longer, axis=0), axis=-1)

@@ -1,14 +1,16 @@
 """File formats of motion, by suffix: what reads and writes each, and what may be said of it.
 
-Functions are named as ``module:function`` and imported when a file is read or written, so that all formats can be
-listed, as ``--help`` does, before any of them is opened. A package of your own adds one with `register`, or by an
-entry point of the group `GROUP` that is named as the suffix without its dot and leads to a `Format`.
+``formats.toml`` lists ours. Functions are named as ``module:function`` and imported when a file is read or written, so
+that all formats can be listed, as ``--help`` does, before any of them is opened. A package of your own adds one with
+`register`, or by an entry point of the group `GROUP` that is named as the suffix without its dot and is a `Format`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from motionloom.reading import read_table
 
 GROUP = "motionloom.formats"
 
@@ -43,62 +45,9 @@ class Format:
     """Raises `MotionloomError` where a program that the writer needs is missing; asked before long work."""
 
 
-def _picture(suffix: str, draw: str, needs: str = "") -> Format:
-    return Format(suffix, writer=f"motionloom.viz.video:{draw}", labels="captions", needs=needs)
-
-
-def _gltf(suffix: str, **written: Any) -> Format:
-    people = "motionloom.io.gltf:load_glb_people"
-    return Format(suffix, "motionloom.io.gltf:load_glb", ("clip",), clips=True, people=people, **written)
-
-
-_CHARACTER = "motionloom.io.character:load_character"
-
 FORMATS = {
-    one.suffix: one
-    for one in (
-        Format(
-            ".bvh",
-            "motionloom.io.bvh:load_bvh",
-            ("fps", "unit"),
-            writer="motionloom.io.bvh_writer:save_bvh",
-            single=True,
-        ),
-        Format(".amc", "motionloom.io.asf:load_amc", ("fps", "unit", "asf")),
-        _gltf(".glb", character=_CHARACTER, writer="motionloom.io.gltf:save_glb", labels="names"),
-        _gltf(".gltf", character=_CHARACTER),
-        _gltf(".vrm", character=_CHARACTER),
-        _gltf(".vrma", writer="motionloom.io.vrma:save_vrma", single=True),
-        Format(".usda", writer="motionloom.io.usda:save_usda", labels="names"),
-        Format(
-            ".fbx",
-            "motionloom.io.fbx:load_fbx",
-            ("clip",),
-            clips=True,
-            writer="motionloom.io.fbx:save_fbx",
-            labels="names",
-            character="motionloom.io.fbx:load_fbx_character",
-            needs="motionloom.io.blender:find_blender",
-        ),
-        Format(
-            ".npz",
-            "motionloom.io.npz:load_npz",
-            ("fps",),
-            metres=True,
-            writer="motionloom.io.npz:save_npz",
-            single=True,
-        ),
-        _picture(".mp4", "draw_video", "motionloom.viz.film:find_ffmpeg"),
-        _picture(".gif", "draw_video"),
-        _picture(".png", "draw_sheet"),
-        Format(
-            ".html",
-            writer="motionloom.viz.page:save_page",
-            labels="captions",
-            scene="motionloom.viz.page:save_people",
-            needs="motionloom.viz.page:find_viewer",
-        ),
-    )
+    suffix: Format(suffix, **row | {"options": tuple(row.get("options", ()))})
+    for suffix, row in read_table("motionloom", "formats.toml").items()
 }
 """Every format, by its suffix."""
 

@@ -1,8 +1,12 @@
-"""Bytes of files from outside: of files and pipes alone, and never more of them than is allowed."""
+"""Bytes of files from outside: of files and pipes alone, and never more than is allowed. And tables of our own."""
 
+import json
 import os
 import stat
+import tomllib
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from motionloom.errors import MotionloomError
 
@@ -56,3 +60,9 @@ def _sized(size: int) -> str:
     if size < 1e5:
         return f"{size:,} bytes"
     return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
+
+
+def read_table(package: str, file: str) -> Any:
+    """The content of a .toml or .json file that ships in a package, such as ``motionloom.cli``."""
+    text = (resources.files(package) / file).read_text(encoding="utf-8")
+    return json.loads(text) if file.endswith(".json") else tomllib.loads(text)

@@ -83,7 +83,7 @@ def test_a_tar_is_as_webdataset_reads_it_and_the_same_bytes_again(ready: Maker) 
 def test_a_shard_that_is_there_is_not_made_again(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     make(ready, rows(4))
     before = everything()
-    monkeypatch.setattr(Maker, "_made", lambda *_: pytest.fail("a motion was made"))
+    monkeypatch.setattr(Maker, "_make_all", lambda *_: pytest.fail("a motion was made"))
     assert make(ready, rows(4)) == Report(0, 4, {"made": 4}, 0)
     assert everything() == before
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.cli import generate, main, parser
+from motionloom.cli import generate, main, parser, tables
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +38,8 @@ def test_ctrl_c_is_one_line_and_130_at_any_moment(moment, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(generate, "add" if moment == "while commands are read" else "_prompts", interrupted)
+    module, name = (tables, "add_entries") if moment == "while commands are read" else (generate, "_prompts")
+    monkeypatch.setattr(module, name, interrupted)
     assert main(["generate", "a person walks"]) == 130
     assert capsys.readouterr() == ("", "motionloom: interrupted\n")
 
@@ -90,6 +91,6 @@ def test_marks_of_other_systems_are_no_part_of_a_prompt(folder):
 
 
 def test_a_warning_is_one_line_without_a_place_in_the_source(monkeypatch, capsys):
-    monkeypatch.setattr(generate, "_generate", lambda arguments: warnings.warn("mind the\n gap", stacklevel=1))
+    monkeypatch.setattr(generate, "run_generate", lambda arguments: warnings.warn("mind the\n gap", stacklevel=1))
     assert main(["generate", "a person walks"]) == 0
     assert capsys.readouterr().err == "motionloom: mind the gap\n"

@@ -1,16 +1,13 @@
 """What people type who have not read the help."""
 
-import argparse
 import io
 import shutil
 import subprocess
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from motionloom.cli import main
-from motionloom.cli.commands import FAMILIES
 from motionloom.io import load
 from motionloom.io.bvh_writer import save_bvh
 from tests.cli.said import complaint
@@ -166,11 +163,3 @@ def test_a_misspelt_other_name_of_an_option_suggests_the_option(capsys: pytest.C
     with pytest.raises(SystemExit):
         main(["generate", "a person walks", "--lenght", "3"])
     assert "did you mean --seconds?" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_a_family_registers_the_commands_that_are_listed_for_it(family: str) -> None:
-    """A command that is run imports its own family alone, so the list must be right."""
-    commands = argparse.ArgumentParser().add_subparsers()
-    import_module(f"motionloom.cli.{family}").add(commands)
-    assert tuple(commands.choices) == FAMILIES[family]

@@ -41,12 +41,12 @@ def test_all_kinds_of_shipped_weights_are_listed_and_found_by_name(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files = {
-        "weights.prior.shipped": {"one": save_prior(tiny.prior(), "1.safetensors")},
-        "weights.predictor.shipped_predictors": {"two": save_predictor(tiny_predictor.predictor(), "2.safetensors")},
-        "weights.pair.blocks": {"three": block(tiny.prior()).save("3.safetensors")},
+        "shipped": {"one": save_prior(tiny.prior(), "1.safetensors")},
+        "shipped_predictors": {"two": save_predictor(tiny_predictor.predictor(), "2.safetensors")},
+        "blocks": {"three": block(tiny.prior()).save("3.safetensors")},
     }
     for function, found in files.items():
-        monkeypatch.setattr(f"motionloom.{function}", lambda found=found: found)
+        monkeypatch.setattr(f"motionloom.cli.weights.{function}", lambda found=found: found)
     assert main(["weights", "--json"]) == 0
     listed = {about["name"]: about["kind"] for about in json.loads(capsys.readouterr().out)}
     assert listed == {"one": "prior", "two": "predictor", "three": "two-person block"}

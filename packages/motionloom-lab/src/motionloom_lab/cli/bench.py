@@ -1,31 +1,19 @@
 """`motionloom bench`: speed and memory, as ratios within one run."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from motionloom.cli.sampling import fail
-from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.cli.tables import add_family
+from motionloom.cli.writing import check_overwriting, fail
 
 
 def add(subparsers) -> None:
     """Register `bench`."""
-    parser = subparsers.add_parser("bench", help="measure speed and memory on this machine")
-    parser.add_argument("--weights", help="shipped name or file (default: default; with --prediction: predictor)")
-    parser.add_argument(
-        "--long", action="store_true", help="measure long motion instead: 1 to 10 minutes of it; takes some minutes"
-    )
-    parser.add_argument("--prediction", action="store_true", help="measure fifty futures of one past instead")
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer repeats and sizes; with --long 10 to 40 s of motion"
-    )
-    parser.add_argument("--device", default="cpu", help="cpu or cuda for the network's part (default cpu)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file as well")
-    add_force(parser)
-    parser.set_defaults(run=_bench)
+    add_family(subparsers, __name__)
 
 
-def _bench(arguments: argparse.Namespace) -> None:
+def run_bench(arguments: argparse.Namespace) -> None:
+    """``motionloom bench``."""
     from motionloom_lab.bench import table
     from motionloom_lab.report.files import check_report, plain, write_json
 

@@ -6,13 +6,11 @@ Its commands and their options are those of `lab/suites/options.toml`; this read
 import argparse
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from motionloom.cli.writing import add_force, check_overwriting
-
-if TYPE_CHECKING:
-    from motionloom_lab.suites.options import Option
+from motionloom.cli.tables import READERS as SHARED
+from motionloom.cli.tables import add_entries, add_option
+from motionloom.cli.writing import check_overwriting
 
 
 def add(subparsers) -> None:
@@ -24,28 +22,10 @@ def add(subparsers) -> None:
     for name, command in commands().items():
         parser = group.add_parser(name, help=command.help)
         for option in command.options:
-            add_option(parser, option)
+            add_option(parser, option, READERS)
         if name != "compare":
-            add_force(parser)
+            add_entries(parser, ["force"], {})
         parser.set_defaults(run=partial(_run, name))
-
-
-def add_option(parser: argparse.ArgumentParser, option: "Option") -> None:
-    """Register one option."""
-    if option.kind == "flag":
-        parser.add_argument(f"--{option.name}", dest=option.dest, action="store_true", help=option.help)
-        return
-    how: dict[str, Any] = {
-        "type": READERS[option.kind],
-        "choices": option.choices or None,
-        "metavar": option.metavar,
-        "help": option.help.replace("%", "%%"),
-    }
-    if option.positional:
-        parser.add_argument(option.name, **how)
-        return
-    how |= {"action": "append"} if option.many == "append" else {"nargs": option.many} if option.many else {}
-    parser.add_argument(f"--{option.name}", dest=option.dest, default=option.default, required=option.required, **how)
 
 
 def _run(name: str, arguments: argparse.Namespace) -> int | None:
@@ -89,11 +69,7 @@ def times(said: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(f"{said!r} is not captions x motions of each, such as 10x10, or 0") from None
 
 
-READERS: dict[str, Callable[[str], Any]] = {
-    "text": str,
-    "int": int,
-    "float": float,
-    "path": Path,
+READERS: dict[str, Callable[[str], Any]] = SHARED | {
     "words": words,
     "numbers": numbers,
     "batch": batch,

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.cli.tables import add_family
+from motionloom.cli.writing import check_overwriting
 from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
@@ -17,27 +18,11 @@ if TYPE_CHECKING:
 
 def add(subparsers) -> None:
     """Register `import`."""
-    parser = subparsers.add_parser(
-        "import", help="published weights to a file: an MDM, PriorMDM or HumanMAC network, or Guo's evaluator"
-    )
-    parser.add_argument(
-        "checkpoint", type=Path, metavar="MODEL.pt|finest.tar", help="model000200000.pt, args.json beside it; or Guo's"
-    )
-    parser.add_argument("--out", type=Path, required=True, help="file to write, .safetensors")
-    parser.add_argument("--mean", type=Path, help="Mean.npy of the data set, as its authors publish it; t2m_mean.npy")
-    parser.add_argument("--std", type=Path, help="Std.npy of the data set; of an evaluator t2m_std.npy")
-    parser.add_argument(
-        "--glove", type=Path, metavar="FOLDER|FILE", help="an evaluator's words: our_vab_* files, or GloVe text"
-    )
-    parser.add_argument("--vip", type=Path, metavar="FILE", help="its special words: word_vectorizer.py, or JSON")
-    parser.add_argument("--name", help="name on the card (default: the checkpoint's)")
-    parser.add_argument("--licence", help="what one may do with these weights, as whoever gave them says")
-    parser.add_argument("--half", action="store_true", help="write float16: half the size, nearly the same numbers")
-    add_force(parser)
-    parser.set_defaults(run=_import)
+    add_family(subparsers, __name__)
 
 
-def _import(arguments: argparse.Namespace) -> None:
+def run_import(arguments: argparse.Namespace) -> None:
+    """``motionloom import CHECKPOINT``."""
     from motionloom.io.atomic import check_place
     from motionloom.weights.prior import save_prior
     from motionloom_lab.papers.commdm import is_pair

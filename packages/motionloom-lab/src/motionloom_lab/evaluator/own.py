@@ -190,14 +190,14 @@ class Judge:
         return np.repeat(np.arange(len(self.held.captions)), [len(said) for said in self.held.captions])
 
     @cached_property
-    def said(self) -> tuple[str, ...]:
+    def sentences(self) -> tuple[str, ...]:
         """All captions in order."""
         return tuple(text for said in self.held.captions for text in said)
 
     @cached_property
     def texts(self) -> Array:
         """(captions, width)."""
-        return self.evaluator.texts([Caption(text) for text in self.said])
+        return self.evaluator.texts([Caption(text) for text in self.sentences])
 
     @cached_property
     def motions(self) -> Array:
@@ -216,7 +216,7 @@ class Judge:
         (numbers) to take from; None: all. Too few motions for a batch: nothing.
         """
         found: dict[str, list[float]] = {"top1": [], "top2": [], "top3": [], "rank": [], "distance": []}
-        usable = np.arange(len(self.said)) if kept is None else kept
+        usable = np.arange(len(self.sentences)) if kept is None else kept
         rng = np.random.default_rng((self.seed, 7))
         for _ in range(self.repeats):
             mixed = rng.permutation(usable)
@@ -252,7 +252,7 @@ class Judge:
         rng = np.random.default_rng((self.seed, 11))
         damaged = self.evaluator.motions([damage(one, rng) for one in self.held.captioned])
         values = self.retrieval(damaged, kept=kept)
-        every = np.arange(len(self.said)) if kept is None else kept
+        every = np.arange(len(self.sentences)) if kept is None else kept
         if len(every):
             values["noticed"] = self.noticed(damaged, every)
         if kept is None:
@@ -297,8 +297,8 @@ def validate(
     judge = Judge(evaluator, held, repeats, seed)
     rows = [_real(judge), _chance(judge)]
     rows += [Row(f"captions shuffled, {s:.0%}", judge.retrieval(judge.motions, shuffled=s)) for s in SHARES]
-    sided = np.array([i for i, text in enumerate(judge.said) if mirror_text(text) != text], dtype=int)
-    timed = np.array([i for i, text in enumerate(judge.said) if TIMED.search(text)], dtype=int)
+    sided = np.array([i for i, text in enumerate(judge.sentences) if mirror_text(text) != text], dtype=int)
+    timed = np.array([i for i, text in enumerate(judge.sentences) if TIMED.search(text)], dtype=int)
     damages: list[tuple[str, Damage, np.ndarray | None]] = [
         ("re-encoded, undamaged", noise(0.0), None),
         *((f"noise {100 * m:g} cm", noise(m), None) for m in NOISE),
@@ -321,7 +321,7 @@ def validate(
         "repeats": repeats,
         "seed": seed,
         "captioned motions": len(held.captioned),
-        "captions": len(judge.said),
+        "captions": len(judge.sentences),
         "windows": len(held.windows),
     }
     return Report(

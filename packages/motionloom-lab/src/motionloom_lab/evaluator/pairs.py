@@ -14,9 +14,8 @@ from torch import Tensor
 
 from motionloom.features import humanml
 from motionloom.features.layout import WIDTH
-from motionloom_train.data.clips import STATES
 from motionloom_train.data.sets import Item, MotionSet, load_set, read_clips
-from motionloom_train.data.words import mirror_text
+from motionloom_train.data.words import STATES, mirror_text
 
 SHARE = {"human": 0.5, "index": 0.12, "label": 0.38}
 """How often a pair shows a written caption, an index description, a measured label."""

@@ -3,9 +3,7 @@
 ``positions`` (frames, 22, 3) metres on the uniform person, SMPL order, the floor near y = 0.
 """
 
-import tomllib
 from collections.abc import Callable
-from importlib import resources
 
 import numpy as np
 
@@ -13,10 +11,11 @@ from motionloom.kinematics import gestures as g
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array, J
 from motionloom.kinematics.wholeness import wholeness
+from motionloom.reading import read_table
 
 Measures = dict[str, float]
 
-MEANING: dict[str, str] = tomllib.loads((resources.files("motionloom_lab.suites") / "actions.toml").read_text("utf-8"))
+MEANING: dict[str, str] = read_table("motionloom_lab.suites", "actions.toml")
 """What each number is."""
 
 

@@ -72,7 +72,7 @@ def signals(positions: Array, *, own: bool = False) -> dict[str, Array]:
         "neck": bend.neck,
         "knees": bend.knees.ravel(),
         "elbows": bend.elbows.ravel(),
-        "head": 100 * _head(positions, own=own)[_stands(positions, bend.knees)],
+        "head": 100 * _head(positions, own=own)[_is_upright(positions, bend.knees)],
     }
 
 
@@ -97,7 +97,7 @@ def reach_of(recordings: Iterable[Array]) -> Reach:
     }
 
 
-def held(clips: Sequence[Array], reach: Reach) -> list[BodyNumber]:
+def compare_bodies(clips: Sequence[Array], reach: Reach) -> list[BodyNumber]:
     """The numbers of drawn motions, (frames, 22, 3) metres each; ``head`` is left out where nobody stands."""
     found = [signals(clip) for clip in clips]
     rows = []
@@ -129,7 +129,7 @@ def _middles(positions: Array) -> tuple[Array, Array, Array, Array]:
     return ankles, hips, shoulders, head
 
 
-def _stands(positions: Array, knees: Array) -> NDArray[np.bool_]:
+def _is_upright(positions: Array, knees: Array) -> NDArray[np.bool_]:
     """(frames,) whether both legs are straight and upright."""
     ankles, hips, _, _ = _middles(positions)
     legs = hips - ankles

@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module, resources
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import Array
 from motionloom.kinematics.wholeness import ENOUGH, wholeness
+from motionloom.reading import read_table
 from motionloom_lab.metrics.actions import Measures, measure
 from motionloom_lab.metrics.everyday.body import Body
 
@@ -42,7 +43,7 @@ class Bound:
         """True where the measure lies in the range, ends included."""
         return self.low <= measures[self.measure] <= self.high
 
-    def wanted(self) -> str:
+    def text(self) -> str:
         """The range as text, such as ``advance >= 1.2``."""
         if self.low == -_INFINITY:
             return f"{self.measure} <= {self.high:g}"
@@ -156,7 +157,7 @@ def _check(name: str, row: Mapping[str, Any], theme: str = "") -> Check:
 
 
 def _rows(file: str) -> dict[str, Any]:
-    return tomllib.loads((resources.files("motionloom_lab.suites") / file).read_text(encoding="utf-8"))
+    return read_table("motionloom_lab.suites", file)
 
 
 CHECKS: tuple[Check, ...] = tuple(_check(name, row) for name, row in _rows("basic_checks.toml").items())

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.kinematics import physics
+from motionloom.reading import read_table
 
 Array = NDArray[np.float64]
 
@@ -45,27 +46,8 @@ class Limbs:
         return tuple(pair for chain in self.chains for pair in pairwise(chain))
 
 
-H36M_LIMBS = Limbs(
-    (
-        (0, 3),
-        (0, 6),
-        (3, 6),
-        (0, 1),
-        (1, 2),
-        (3, 4),
-        (4, 5),
-        (6, 7),
-        (7, 8),
-        (8, 9),
-        (7, 10),
-        (7, 13),
-        (10, 11),
-        (11, 12),
-        (13, 14),
-        (14, 15),
-    ),
-    ((3, 4), (0, 2, 7, 8, 9), (1, 7, 10, 12, 13), (7, 11, 14, 15)),
-)
+_H36M = read_table("motionloom_lab.papers", "benchmarks.toml")["h36m"]
+H36M_LIMBS = Limbs(tuple((a, b) for a, b in _H36M["limbs"]), tuple(map(tuple, _H36M["chains"])))
 """The limbs of the 16 joints of Human3.6M as SkeletonDiffusion's published evaluation has them."""
 
 

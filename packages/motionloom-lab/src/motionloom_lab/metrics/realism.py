@@ -4,15 +4,14 @@ A generated group is compared with real clips of the same kind: 20 frames per se
 y = 0. A number may be up to 1.5 times the real one, or smaller than anybody can see.
 """
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 
 import numpy as np
 
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_table
 
 LIMIT = 1.5
 """How many times the real number is still taken for real."""
@@ -33,10 +32,7 @@ class Number:
 
 
 NUMBERS: tuple[Number, ...] = tuple(
-    Number(name, **row)
-    for name, row in tomllib.loads(
-        (resources.files("motionloom_lab.suites") / "realism.toml").read_text(encoding="utf-8")
-    ).items()
+    Number(name, **row) for name, row in read_table("motionloom_lab.suites", "realism.toml").items()
 )
 
 

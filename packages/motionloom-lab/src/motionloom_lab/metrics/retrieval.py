@@ -47,7 +47,7 @@ def r_precision(texts: ArrayLike, motions: ArrayLike, *, top: int = 3, batch: in
     size = len(t) if batch is None else batch
     if not 1 <= top <= size:
         raise MotionloomError(f"R-precision counts the top {top} of {size} motions: choose 1 to {size}.")
-    shares = [_found(t[i : i + size], m[i : i + size], top) for i in range(0, len(t), size)]
+    shares = [_hit_chances(t[i : i + size], m[i : i + size], top) for i in range(0, len(t), size)]
     return np.concatenate(shares).mean(axis=0)
 
 
@@ -105,7 +105,7 @@ def _pairs(texts: ArrayLike, motions: ArrayLike, batch: int | None) -> tuple[Arr
     return t[:used], m[:used]
 
 
-def _found(texts: Array, motions: Array, top: int) -> Array:
+def _hit_chances(texts: Array, motions: Array, top: int) -> Array:
     """(n, top) chance that the own motion is among the k nearest, rows in chunks of `_CELLS` distances."""
     centre = motions.mean(axis=0)  # distances stay, and cancellation goes
     t, m = texts - centre, motions - centre

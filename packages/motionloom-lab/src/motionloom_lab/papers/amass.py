@@ -148,7 +148,7 @@ def _places(path: Path) -> tuple[NDArray[np.float32], bool]:
         step = _step(motion.fps)
         kept = replace(motion, root=motion.root[::step], rotations=motion.rotations[::step]).positions()
         return (kept[..., [2, 1, 0]] * [-1.0, 1.0, 1.0]).astype(np.float32), False  # the reader keeps x, this y, z, x
-    places, fps = _given(path)
+    places, fps = _positions_of(path)
     if places.ndim != 3 or places.shape[1:] != (22, 3) or not len(places) or places.dtype.kind != "f":
         raise MotionloomError(
             f"{path} holds {places.dtype} of the shape {places.shape} and must hold numbers of (frames, 22, 3)"
@@ -158,7 +158,7 @@ def _places(path: Path) -> tuple[NDArray[np.float32], bool]:
     return places[:: _step(fps)].astype(np.float32)[..., [1, 2, 0]], True
 
 
-def _given(path: Path) -> tuple[np.ndarray, float]:
+def _positions_of(path: Path) -> tuple[np.ndarray, float]:
     if path.suffix == ".npz":
         arrays = npz.read_arrays(path, only=("positions", "joints", "fps", "rotations"))
         places = arrays.get("positions", arrays.get("joints"))

@@ -1,15 +1,12 @@
 """The skeletons of the prediction benchmarks, as published systems see them: from the root, +Z up, no way through
 the world; and whatever else ``benchmarks.toml`` says of them."""
 
-import tomllib
-from importlib import resources
 from typing import Any
 
 from motionloom.features.positions import Layout
+from motionloom.reading import read_table
 
-TABLES: dict[str, Any] = tomllib.loads(
-    (resources.files("motionloom_lab.papers") / "benchmarks.toml").read_text(encoding="utf-8")
-)
+TABLES: dict[str, Any] = read_table("motionloom_lab.papers", "benchmarks.toml")
 
 
 def _layout(name: str) -> Layout:

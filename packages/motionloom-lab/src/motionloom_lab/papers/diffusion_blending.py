@@ -70,7 +70,7 @@ def control_features(
     """
     chosen = Sampling.of(sampling, settings)
     mask = observed.mask
-    known = _given(prior, observed.values, mask)
+    known = _known_part(prior, observed.values, mask)
     if not nets or not len(prompts) == len(seeds) == len(known):
         raise MotionloomError(
             f"{len(nets)} networks, {len(prompts)} prompts and {len(seeds)} seeds do not fit {len(known)} motions; "
@@ -123,7 +123,7 @@ def controlled(
     )
 
 
-def _given(prior: Prior, known: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _known_part(prior: Prior, known: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """``known`` where it is given, zeros elsewhere."""
     if mask.dtype != np.bool_ or known.ndim != 3 or mask.shape != known.shape or known.shape[2] != len(prior.mean):
         raise MotionloomError(

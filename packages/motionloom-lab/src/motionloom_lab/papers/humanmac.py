@@ -192,7 +192,7 @@ def _approached(target: SwitchTarget, rows: int, walk: Sequence[int], basis: Bas
     return Held(basis.to_spectrum(signal), mask, walk[steps - relaxed] if relaxed < steps else math.inf)
 
 
-def told_samples(count: int, share: float, *, coin: int | None = None) -> list[bool]:
+def conditioned_samples(count: int, share: float, *, coin: int | None = None) -> list[bool]:
     """Which of ``count`` samples are told the observation: the first round(share * count).
 
     With ``coin`` (a seed) one coin per sample, as published, where a sample is one call for all windows.
@@ -226,7 +226,7 @@ def published_futures(
     if min(count, rows) < 1:
         raise MotionloomError(f"there must be at least one future and one row at a time, not {count} and {rows}")
     place = predictor.layout.place(past[:, -1])
-    conditioned = np.array(told_samples(count, told_share, coin=coin))
+    conditioned = np.array(conditioned_samples(count, told_share, coin=coin))
     observed = predictor.layout.encode(past, place).astype(np.float32)
     made: list[np.ndarray] = []
     for first in range(0, len(past) * count, rows):

@@ -3,20 +3,18 @@
 The numbers stand in `published.json`, block by block with what they were measured on; no comparison ever reads them.
 """
 
-import json
 from collections.abc import Sequence
 from functools import cache
-from importlib import resources
 from typing import Any
 
+from motionloom.reading import read_table
 from motionloom_lab.report.report import Row, Value
 
 
 @cache
 def blocks() -> list[dict[str, Any]]:
     """Each with its ``suites``, ``measured_on``, ``source``, ``columns`` and ``rows``: a name and numbers or nulls."""
-    place = resources.files("motionloom_lab.report") / "published.json"
-    return json.loads(place.read_text(encoding="utf-8"))
+    return read_table("motionloom_lab.report", "published.json")
 
 
 def published(suite: str, columns: Sequence[str]) -> tuple[Row, ...]:

@@ -180,7 +180,7 @@ def markdown(report: Report) -> str:
     if any(c.better for c in report.columns):
         parts.append("↑ more is better, ↓ less is better, → nearer to the real row is better.")
     if report.protocol:
-        parts.append("Protocol:\n\n" + "\n".join(f"- {_line(k)}: {_said(v)}" for k, v in report.protocol.items()))
+        parts.append("Protocol:\n\n" + "\n".join(f"- {_line(k)}: {_in_words(v)}" for k, v in report.protocol.items()))
     parts += [_line(note) for note in report.notes]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -282,11 +282,11 @@ def _counts(counts: Sequence[int]) -> str:
     return "" if not most else str(most) if least == most else f"{least} to {most}"
 
 
-def _said(value: Any) -> str:
+def _in_words(value: Any) -> str:
     if isinstance(value, Mapping):
-        return ", ".join(f"{k} {_said(v)}" for k, v in value.items())
+        return ", ".join(f"{k} {_in_words(v)}" for k, v in value.items())
     if isinstance(value, (list, tuple)):
-        return ", ".join(_said(v) for v in value)
+        return ", ".join(_in_words(v) for v in value)
     return _line("none" if value is None else f"{value:g}" if isinstance(value, float) else str(value))
 
 

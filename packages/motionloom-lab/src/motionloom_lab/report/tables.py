@@ -1,17 +1,16 @@
 """What every suite's table has: its columns (``lab/suites/columns.toml``) and the notes under it (``notes.toml``)."""
 
-import tomllib
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from typing import Any
 
+from motionloom.reading import read_table
 from motionloom_lab.report.report import Column
 
 
 @cache
 def _rows(file: str) -> dict[str, Any]:
-    return tomllib.loads((resources.files("motionloom_lab.suites") / file).read_text(encoding="utf-8"))
+    return read_table("motionloom_lab.suites", file)
 
 
 def columns(table: str) -> tuple[Column, ...]:

@@ -4,9 +4,7 @@
 `motionloom evaluate reach` makes it anew.
 """
 
-import json
 from collections.abc import Callable, Iterator, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.kinematics.physics import Array
 from motionloom.kinematics.wholeness import whole_frames
+from motionloom.reading import read_table
 from motionloom_lab.metrics import bodies
 from motionloom_lab.papers.readers import find_takes
 
@@ -24,8 +23,7 @@ MOST = 200
 
 def known() -> bodies.Reach:
     """The shipped percentiles."""
-    place = resources.files("motionloom_lab.suites") / "bodies.json"
-    return {name: tuple(values) for name, values in json.loads(place.read_text(encoding="utf-8"))["reach"].items()}
+    return {name: tuple(values) for name, values in read_table("motionloom_lab.suites", "bodies.json")["reach"].items()}
 
 
 def reach_of(folders: Sequence[Path | str], *, say: Callable[[str], None] = lambda line: None) -> bodies.Reach:
@@ -60,7 +58,7 @@ def _recordings(folders: Sequence[Path | str], say: Callable[[str], None]) -> It
 
 def judge(made: Sequence[Array], reach: bodies.Reach) -> dict[str, Any]:
     """How drawn bodies are held, as plain data; ``passed`` of ``of``."""
-    rows = bodies.held(made, reach)
+    rows = bodies.compare_bodies(made, reach)
     whole = float(np.mean([whole_frames(clip).mean() for clip in made])) if made else 0.0
     stretched = bodies.stretched(made)
     numbers: dict[str, Any] = {

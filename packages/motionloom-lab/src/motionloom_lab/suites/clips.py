@@ -1,17 +1,18 @@
 """Real clips to compare with, from a built training set or straight from recordings."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml
 from motionloom.features.layout import FPS
 from motionloom.io.atomic import finished
 from motionloom.kinematics.physics import Array
 from motionloom_lab.papers.readers import find_takes
 from motionloom_train.data.build import clips_of
 from motionloom_train.data.clips import Clip, read_clip
+from motionloom_train.data.sources import Take
 
 LONGEST = 30 * FPS
 """Frames: a collection's one line about a longer clip says too little about any part of it."""
@@ -43,7 +44,7 @@ def real_clips(folder: Path | str) -> Iterator[RealClip]:
     """
     folder = Path(folder)
     found = False
-    for clip in _built(folder) if (folder / "clips").is_dir() else _recorded(folder):
+    for clip in plain_clips(folder):
         for real in _stretches(clip):
             found = True
             yield real
@@ -51,25 +52,30 @@ def real_clips(folder: Path | str) -> Iterator[RealClip]:
         raise MotionloomError(f"{folder} has no clips to compare with; make a set with 'motionloom data build'")
 
 
-def _built(folder: Path) -> Iterator[Clip]:
-    for path in finished(folder / "clips", "*.safetensors"):
-        if path.stem.endswith(("_looped", "_reversed")) or path.stem.startswith(("M", "mixed_")):
-            continue
-        clip = read_clip(path)
-        if clip.way == "plain":
-            yield clip
+def plain_clips(
+    folder: Path, *, mirrored: bool = False, chosen: Callable[[Take], bool] = lambda take: True
+) -> Iterator[Clip]:
+    """The clips of a built set, or of the ``chosen`` recordings of a folder, that show what was recorded as it was.
 
-
-def _recorded(folder: Path) -> Iterator[Clip]:
-    for take in find_takes(folder):
+    ``mirrored``: their mirror images too.
+    """
+    if (folder / "clips").is_dir():
+        for path in finished(folder / "clips", "*.safetensors"):
+            derived = path.stem.endswith(("_looped", "_reversed")) or path.stem.startswith("mixed_")
+            if not derived and (mirrored or not path.stem.startswith("M")):
+                clip = read_clip(path)
+                if clip.way == "plain":
+                    yield clip
+        return
+    for take in filter(chosen, find_takes(folder)):
         try:
-            yield next(clips_of(take))
+            yield from islice(clips_of(take), 1 + mirrored)
         except MotionloomError:
             continue  # too short or damaged: `data build` says which
 
 
 def _stretches(clip: Clip) -> Iterator[RealClip]:
-    positions = humanml.decode_positions(clip.features.astype(float))
+    positions = clip.positions()
     notes = [note for note in clip.notes if note.kind == "human"]
     if not notes and len(positions) <= LONGEST:
         notes = [note for note in clip.notes if note.kind == "index"]

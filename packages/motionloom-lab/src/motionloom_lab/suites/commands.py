@@ -190,7 +190,7 @@ def every(asked: Asked) -> int:
         for name in results.fill_page(asked["results"], made, again=again):
             say(f"{asked['results']} keeps the full numbers of {name}; say --again to replace them by quick ones")
     for outcome in outcomes:
-        print(f"{outcome.suite.name}: {outcome.said}")
+        print(f"{outcome.suite.name}: {outcome.summary}")
     return 2 if any(outcome.failed for outcome in outcomes) else 0
 
 

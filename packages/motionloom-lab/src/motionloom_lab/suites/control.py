@@ -174,13 +174,13 @@ def of_real(trial: ControlTrial, replication: int) -> dict[str, float]:
 def of_method(trial: ControlTrial, one: Kind, name: str, replication: int) -> dict[str, float]:
     """One way of control on one kind of goal; the time is that of making the motions."""
     targets = trial.targets(one, replication)
-    made, seconds = trial.plain.get((name, replication)) or _made(trial, one, name, replication, targets)
+    made, seconds = trial.plain.get((name, replication)) or _generated(trial, one, name, replication, targets)
     if name in BASE.values():
         trial.plain[name, replication] = made, seconds
     return {**measured(trial, replication, made, targets), "seconds": seconds / len(targets)}
 
 
-def _made(
+def _generated(
     trial: ControlTrial, one: Kind, name: str, replication: int, targets: Sequence[Target]
 ) -> tuple[list[Made], float]:
     """One motion per target, and the seconds that all took."""
@@ -303,7 +303,7 @@ def run(
         selection=selection,
     )
     files = {name: digest(path) for name, path in adapters().items()}
-    said = {**protocol.drawn(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
+    said = {**protocol.sampling(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
     parts = run.parts({**said, **run.settings(judge)})
     return measure(trial, asked, methods, run, parts=parts)
 

@@ -30,7 +30,7 @@ from motionloom_lab.suites.duet_ways import FRAMES, GIVEN, Crops, Way
 from motionloom_lab.suites.harness import Run, Say, check_names, digest
 from motionloom_lab.suites.needs import NoData, pairs_of
 from motionloom_lab.suites.parts import Parts
-from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
+from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges, reported
 from motionloom_train.data.pairs import Pair
 
 KINDS = ("real", "zero", "constant", "silent", "communication", "ours", "mrt")
@@ -104,7 +104,7 @@ def run(
     prior = Prior.load(run.weights, device=run.device)
     found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
     made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=run.device)
-    others = duet_blocks.beside(prior, beside, _asked(how))
+    others = duet_blocks.beside(prior, beside, _sampling(how))
     crops = draw(held_out(pairs_of(run.data, captions=False, say=run.progress)), how)
     about = {
         "weights": run.label,
@@ -157,20 +157,20 @@ def ways_of(
     device: str = "cpu",
 ) -> dict[str, Way]:
     """Every way that there are weights for, by its kind."""
-    asked = _asked(how)
+    asked = _sampling(how)
     found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
-    found["silent"] = ways.drawn(prior, ways.no_communication_net(prior), **asked)
+    found["silent"] = ways.sampled(prior, ways.no_communication_net(prior), **asked)
     if communication is not None and "communication" in kinds:
-        found["communication"] = ways.drawn(*ways.only_communication(prior, communication), **asked)
+        found["communication"] = ways.sampled(*ways.only_communication(prior, communication), **asked)
     if block is not None:
-        found["ours"] = ways.drawn(prior, block.net(prior), **asked)
+        found["ours"] = ways.sampled(prior, block.net(prior), **asked)
     if mrt is not None and "mrt" in kinds:
         found["mrt"] = ways.by_mrt(MrtFile.load(mrt, device=device).net)
     return found
 
 
-def _asked(how: CompletionSettings) -> dict[str, Any]:
-    """What `duet_ways.drawn` takes."""
+def _sampling(how: CompletionSettings) -> dict[str, Any]:
+    """What `duet_ways.sampled` takes."""
     return {"given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt}
 
 
@@ -299,25 +299,21 @@ def verdicts(errors: Mapping[str, tuple[str, Mapping[str, Array]]]) -> tuple[str
 
 
 def protocol_of(crops: Crops, how: CompletionSettings) -> dict[str, Any]:
-    """The notes under the table."""
+    """What is printed with the table."""
     known, true = GIVEN[how.given]
-    last = "of the real next frame" if true else "as between the last two given ones"
-    return {
-        "split": "validation and test pairs",
+    values = {
+        "how": how,
         "crops": len(crops.numbers),
-        "frames per second": mp.FPS,
-        "frames": f"{mp.PREFIX} given, {FRAMES - mp.PREFIX} said, errors from frame {mp.PREFIX} on",
-        "known slots": f"{known + 1}: D and {known} frames, the velocity out of the last {last} ({how.given})",
-        "representation": "263 HumanML3D features a person; zero, constant and transformer: positions",
-        "frame of reference": "person 0 at frame 0; people of one size",
+        "fps": mp.FPS,
+        "prefix": mp.PREFIX,
+        "said": FRAMES - mp.PREFIX,
+        "slots": known + 1,
+        "known": known,
+        "last": "of the real next frame" if true else "as between the last two given ones",
         "prompt": how.prompt or "none",
-        "samples": how.samples,
-        "steps": how.steps,
-        "guidance": how.guidance,
-        "seed": how.seed,
-        "interval": "1.96 sigma / sqrt(crops)",
-        "crops chosen": hashlib.sha256(np.round(crops.positions, 4).astype(np.float32).tobytes()).hexdigest()[:12],
+        "chosen": hashlib.sha256(np.round(crops.positions, 4).astype(np.float32).tobytes()).hexdigest()[:12],
     }
+    return reported("duet-completion", values)
 
 
 def _digest(path: Path) -> str:

@@ -28,7 +28,7 @@ class Beside:
 
 
 def beside(prior: Prior, files: Sequence[str | Path], asked: dict[str, Any]) -> tuple[Beside, ...]:
-    """The blocks of files, or shipped ones, all over ``prior``; ``asked``: as of `duet_ways.drawn`.
+    """The blocks of files, or shipped ones, all over ``prior``; ``asked``: as of `duet_ways.sampled`.
 
     Raises MotionloomError for a file that is none, for another prior's block, and for two blocks of one name.
     """
@@ -39,7 +39,9 @@ def beside(prior: Prior, files: Sequence[str | Path], asked: dict[str, Any]) -> 
         if name in found:
             raise MotionloomError(f"two of the blocks to stand beside are called {name!r}; give each a name of its own")
         path = blocks().get(str(file)) or Path(file)
-        found[name] = Beside(f"{name}: {sizes(block)}", digest(path)[:12], ways.drawn(prior, block.net(prior), **asked))
+        found[name] = Beside(
+            f"{name}: {sizes(block)}", digest(path)[:12], ways.sampled(prior, block.net(prior), **asked)
+        )
     return tuple(found.values())
 
 

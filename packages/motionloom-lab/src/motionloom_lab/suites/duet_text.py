@@ -30,7 +30,7 @@ from motionloom_lab.suites.duet import HELD_OUT, chosen_block
 from motionloom_lab.suites.duet_ways import no_communication_net
 from motionloom_lab.suites.harness import Run, Say, check_names
 from motionloom_lab.suites.needs import pairs_of
-from motionloom_lab.suites.protocol import SEEDS, check_ranges
+from motionloom_lab.suites.protocol import SEEDS, check_ranges, reported
 from motionloom_train.data.pairs import Pair, windows
 
 KINDS = ("real", "held-out", "strangers", "ours", "our-strangers", "silent")
@@ -209,7 +209,7 @@ def measure(
     for kind, make, name in (("ours", ours, "ours"), ("silent", silent, "prior without communication")):
         if make is None or not {kind, "our-strangers" if kind == "ours" else kind} & set(kinds):
             continue
-        made, seconds = _made(make, table.captions, how, lambda line, n=name: run.progress(f"{n}: {line}"))
+        made, seconds = _generated(make, table.captions, how, lambda line, n=name: run.progress(f"{n}: {line}"))
         for end, cut in table.cuts if kind == "ours" else table.cuts[:1]:
             clips = [cut(duet) for duet in made]
             if kind in kinds:
@@ -266,7 +266,7 @@ def turns(captions: Sequence[str], how: DuetSettings) -> list[tuple[str, int, in
     ]
 
 
-def _made(make: Make, captions: Sequence[str], how: DuetSettings, say: Say) -> tuple[list[Array], float]:
+def _generated(make: Make, captions: Sequence[str], how: DuetSettings, say: Say) -> tuple[list[Array], float]:
     """Positions of all duets, in the order of `turns`, and seconds for one."""
     made, began = [], time.perf_counter()
     for caption, count, seed in turns(captions, how):
@@ -320,19 +320,13 @@ def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def protocol_of(recorded: dict[str, list[Array]], captions: Sequence[str], how: DuetSettings) -> dict[str, Any]:
-    """The notes under the table."""
-    return {
+    """What is printed with the table."""
+    values = {
+        "how": how,
         "recordings": len(recorded),
-        "real windows": sum(map(len, recorded.values())),
-        "frames per second": mp.FPS,
-        "seconds": how.seconds,
-        "duets": how.duets,
+        "windows": sum(map(len, recorded.values())),
+        "fps": mp.FPS,
         "captions": list(captions),
-        "representation": "263 HumanML3D features a person; numbers from positions of people of one size",
-        "steps": how.steps,
-        "guidance": how.guidance,
         "feet": "cleaned up" if how.clean else "as drawn",
-        "seed": how.seed,
-        "interval": "1.96 sigma / sqrt(duets or windows)",
-        "spread": "Wasserstein-1 of a real recording from all others, mean over recordings",
     }
+    return reported("duets", values)

@@ -84,7 +84,7 @@ def by_mrt(net: Mrt) -> Way:
     return way
 
 
-def seen(crop: np.ndarray, given: str) -> np.ndarray:
+def visible_part(crop: np.ndarray, given: str) -> np.ndarray:
     """What of a crop (2, 81, 22, 3) features are made of: (2, known frames + 1, 22, 3)."""
     frames, true = GIVEN[given]
     if true:
@@ -93,7 +93,7 @@ def seen(crop: np.ndarray, given: str) -> np.ndarray:
     return np.concatenate([past, 2 * past[:, -1:] - past[:, -2:-1]], axis=1)
 
 
-def drawn(
+def sampled(
     prior: Prior,
     net: PairSession,
     *,
@@ -112,7 +112,7 @@ def drawn(
     """
 
     def way(crops: Crops, sample: int) -> Array:
-        known = [two.encode(seen(crop, given)) for crop in crops.positions]
+        known = [two.encode(visible_part(crop, given)) for crop in crops.positions]
         states = [known_state(prior, net, one.features, one.poses, FRAMES) for one in known]
         people = [person for one in known for person in one.features]
         leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]

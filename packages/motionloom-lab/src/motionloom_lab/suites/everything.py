@@ -38,7 +38,7 @@ class Outcome:
     why: str = ""
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """The state, and why."""
         return f"{self.state}: {self.why}" if self.why else self.state
 
@@ -69,7 +69,7 @@ def run_all(
         outcome = _one(suite, job, out / suite.name, again=again)
         if keep and outcome.report:
             files.write_json(keep / f"{suite.name}.json", reports.encode(outcome.report))
-        job.tools.progress(f"{suite.name}: {outcome.said}")
+        job.tools.progress(f"{suite.name}: {outcome.summary}")
         outcomes.append(outcome)
     return outcomes
 

@@ -5,27 +5,22 @@ They come out of a built set, a folder of recordings, or HumanML3D as its author
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
-from motionloom.io.atomic import finished
-from motionloom.io.npz import read_array
+from motionloom.features.layout import FPS
 from motionloom.io.text import read_utf8
 from motionloom_lab.evaluator.evaluators import Caption
-from motionloom_lab.papers.readers import find_takes
+from motionloom_lab.suites.clips import plain_clips
 from motionloom_lab.suites.protocol import MOST_ITEMS, Selection
-from motionloom_train.data.build import clips_of
-from motionloom_train.data.clips import Clip, read_clip
-from motionloom_train.data.sources import listed_names
+from motionloom_train.data.clips import Clip
+from motionloom_train.data.sources import Take, listed_names, read_features
 from motionloom_train.data.words import check_caption
 
 SPARE = 4
 """Frames above the longest length that are cut off; a stretch that is longer still is left out."""
-_MADE_UP = ("_looped", "_reversed")
 _MAX_TEXT = 64 << 20
 
 
@@ -59,8 +54,8 @@ def read_items(folder: Path | str, selection: Selection) -> list[Item]:
     if (folder / "new_joint_vecs").is_dir():
         found = _humanml3d(folder, selection)
     else:
-        clips = _built(folder) if (folder / "clips").is_dir() else _recorded(folder, selection)
-        found = (item for clip in clips if _wanted(clip, selection) for item in _described(clip))
+        clips = plain_clips(folder, mirrored=selection.mirrored, chosen=lambda take: _selected(take, selection))
+        found = (item for clip in clips if _selected(clip, selection) for item in _described(clip))
     kept = [one for item in found if (one := fitted(item, selection)) is not None]
     if len(kept) > MOST_ITEMS:
         raise MotionloomError(
@@ -108,28 +103,8 @@ def pick(captions: Sequence[Sequence[Caption]], rng: np.random.Generator) -> lis
     return [int(rng.integers(len(several))) for several in captions]
 
 
-def _wanted(clip: Clip, selection: Selection) -> bool:
-    return (
-        clip.way == "plain"
-        and clip.split in selection.splits
-        and (not selection.sources or clip.source.startswith(selection.sources))
-        and (selection.mirrored or not clip.name.startswith("M"))
-    )
-
-
-def _built(folder: Path) -> Iterator[Clip]:
-    for path in finished(folder / "clips", "*.safetensors"):
-        if not path.stem.endswith(_MADE_UP) and not path.stem.startswith("mixed_"):
-            yield read_clip(path)
-
-
-def _recorded(folder: Path, selection: Selection) -> Iterator[Clip]:
-    for take in find_takes(folder):
-        if take.split in selection.splits and take.source.startswith(selection.sources or ("",)):
-            try:
-                yield from islice(clips_of(take), 2)  # itself and its mirror image
-            except MotionloomError:
-                continue  # too short or damaged: `data build` says which
+def _selected(one: Clip | Take, selection: Selection) -> bool:
+    return one.split in selection.splits and one.source.startswith(selection.sources or ("",))
 
 
 def _described(clip: Clip) -> Iterator[Item]:
@@ -148,7 +123,7 @@ def _humanml3d(folder: Path, selection: Selection) -> Iterator[Item]:
             continue
         place = folder / "new_joint_vecs" / f"{name}.npy"
         if place.is_file():  # as published: what the folder lacks is skipped
-            yield from _spoken(name, split, _features(place), _text(folder / "texts" / f"{name}.txt"))
+            yield from _spoken(name, split, read_features(place), _text(folder / "texts" / f"{name}.txt"))
 
 
 def _spoken(name: str, split: str, features: np.ndarray, text: str) -> Iterator[Item]:
@@ -172,16 +147,6 @@ def _spoken(name: str, split: str, features: np.ndarray, text: str) -> Iterator[
     for (first, last), captions in spans.items():
         label = f"{name}@{first / FPS:g}-{last / FPS:g}"
         yield Item(label, "humanml3d", split, tuple(captions), features[first:last])
-
-
-def _features(path: Path) -> np.ndarray:
-    found = read_array(path)
-    if found.ndim != 2 or found.shape[1] != WIDTH or found.dtype.kind != "f" or not np.isfinite(found).all():
-        raise MotionloomError(
-            f"{path} is not an array of finite features (frames, {WIDTH}), but {found.dtype} of the shape "
-            f"{found.shape}; fetch it again"
-        )
-    return np.array(found, dtype=np.float32)
 
 
 def _text(path: Path) -> str:

@@ -149,7 +149,7 @@ def summary(results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, sett
                 "seconds": check.seconds,
                 "obeyed": sum(a.obeyed for a in own),
                 "of": len(own),
-                "wanted": [bound.wanted() for bound in check.bounds],
+                "wanted": [bound.text() for bound in check.bounds],
                 "paraphrases": {p: sum(a.obeyed for a in result.of(p)) for p in check.paraphrases if result.of(p)},
                 "attempts": [a.__dict__ for a in result.attempts],
             }
@@ -210,7 +210,7 @@ def table(
         own = result.of(check.prompt)
         other = [a for a in result.attempts if a.prompt != check.prompt]
         seen = "; ".join(
-            f"{_median([a.measured.get(b.measure, float('nan')) for a in own]):g} of {b.wanted()}" for b in check.bounds
+            f"{_median([a.measured.get(b.measure, float('nan')) for a in own]):g} of {b.text()}" for b in check.bounds
         )
         known = (real or {}).get(check.name, {})
         rows.append(

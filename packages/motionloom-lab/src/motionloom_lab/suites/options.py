@@ -1,34 +1,17 @@
 """The commands of `motionloom evaluate` and their options, as ``options.toml`` lists them; quick to import."""
 
 import shlex
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from motionloom.cli.tables import Option
+from motionloom.reading import read_table
+
 NOT_TYPED = {"weights", "data", "out", "json", "device", "threads", "force", "quick", "keep", "rows-without-published"}
 """Options that a command to measure the same again has in another place, or that change no number."""
-
-
-@dataclass(frozen=True)
-class Option:
-    """One option, or one word without a name."""
-
-    name: str
-    """As it is typed, without the dashes."""
-    help: str
-    kind: str = "text"
-    choices: tuple[str, ...] = ()
-    many: str = ""
-    default: Any = None
-    metavar: str | None = None
-    dest: str = ""
-    """What the value is called."""
-    required: bool = False
-    positional: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,18 +28,14 @@ class Command:
 @cache
 def commands() -> dict[str, Command]:
     """All commands by name."""
-    found = tomllib.loads((resources.files("motionloom_lab.suites") / "options.toml").read_text(encoding="utf-8"))
+    found = read_table("motionloom_lab.suites", "options.toml")
     shared = found.pop("shared")
     return {name: _command(name, row, shared | row.get("own", {})) for name, row in found.items()}
 
 
-def _command(name: str, row: Mapping[str, Any], rows: Mapping[str, Mapping[str, Any]]) -> Command:
-    options = [_option(option, rows[option]) for option in row["options"]]
+def _command(name: str, row: Mapping[str, Any], rows: Mapping[str, dict[str, Any]]) -> Command:
+    options = [Option.of(option, rows[option]) for option in row["options"]]
     return Command(name, row["help"], row.get("run", "measured"), tuple(options))
-
-
-def _option(name: str, row: Mapping[str, Any]) -> Option:
-    return Option(name, **{"dest": name.replace("-", "_"), **row, "choices": tuple(row.get("choices", ()))})
 
 
 def typed(command: Command, given: Mapping[str, Any]) -> str:

@@ -24,7 +24,7 @@ from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import prediction_trial as trials
 from motionloom_lab.suites.harness import Run, check_names, check_steps, digest, row_of
 from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, Way
-from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
+from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges, reported
 
 ZERO, CONSTANT = "zero velocity", "constant velocity"
 KINDS = ("real", "zero", "constant", "ours", "ours-many", "published")
@@ -140,7 +140,7 @@ def measure(
     )
 
 
-def drawn(
+def sampled(
     predictor: Predictor,
     seed: int,
     *,
@@ -185,8 +185,8 @@ def _ways(
         "real": (REAL, None, 1),
         "zero": (ZERO, lambda seed: by_rule(metrics.zero_velocity, frames), 1),
         "constant": (CONSTANT, lambda seed: by_rule(metrics.constant_velocity, frames), 1),
-        "ours": (f"{label}, {how.steps} steps", lambda s: drawn(predictor, s, steps=how.steps, **few), again),
-        "ours-many": (f"{label}, {many} steps", lambda s: drawn(predictor, s, steps=many, **few), again),
+        "ours": (f"{label}, {how.steps} steps", lambda s: sampled(predictor, s, steps=how.steps, **few), again),
+        "ours-many": (f"{label}, {many} steps", lambda s: sampled(predictor, s, steps=many, **few), again),
         "published": (
             f"{label}, published sampler, {many} steps",
             lambda s: as_published(predictor, s, samples=how.samples, steps=many),
@@ -198,36 +198,25 @@ def _ways(
 
 
 def protocol_of(trial: PredictionTrial, how: PredictionSettings, predictor: Predictor) -> dict[str, Any]:
-    """What stands with every table."""
-    p = trial.protocol
+    """What is printed with every table."""
+    data = trial.protocol
     classes = {recording.action for recording, _ in trial.windows}
-    return {
-        "data": p.name,
-        "licence": p.licence,
-        "split": "test",
-        "recordings": len(p.split("test")),
-        "test windows": len(trial.every),
-        "windows measured": len(trial.windows),
-        "windows with more than one future": trial.several,
-        "similar pasts": f"last poses nearer than {p.threshold:g} m",
-        "windows with one future": how.singles.replace("_", " "),
-        "frames per second": p.fps,
-        "frames": f"{p.observed} seen, {p.future} predicted",
-        "representation": f"places of {p.layout.joints - 1} joints from the root, metres, axes of the world",
-        "statistics": "those of the weights",
-        "trained on": predictor.card.data,
-        "variant": predictor.variant,
-        "bones": "ours: as long as the past's; published sampler: as drawn",
-        "CMD": f"{len(classes)} classes, speeds {'published' if classes <= p.speeds.keys() else 'of the real futures'}",
-        "samples": how.samples,
-        "sampler": f"{SOLVER}, {SPACING} spacing",
-        "steps": how.steps,
-        "many steps": how.published_steps,
-        "guidance": how.guidance,
-        "seed": how.seed,
-        "replications": how.replications,
-        "interval": "1.96 sigma / sqrt(replications)",
+    values = {
+        "data": data,
+        "trial": trial,
+        "predictor": predictor,
+        "how": how,
+        "recordings": len(data.split("test")),
+        "every": len(trial.every),
+        "windows": len(trial.windows),
+        "singles": how.singles.replace("_", " "),
+        "joints": data.layout.joints - 1,
+        "classes": len(classes),
+        "speeds": "published" if classes <= data.speeds.keys() else "of the real futures",
+        "solver": SOLVER,
+        "spacing": SPACING,
     }
+    return reported("prediction", values)
 
 
 def _identity(trial: PredictionTrial) -> str:

@@ -23,7 +23,7 @@ from motionloom_lab.suites import prediction_trial as trials
 from motionloom_lab.suites.harness import Run, Say, silent, weight_marks
 from motionloom_lab.suites.prediction_behaviour import Study
 from motionloom_lab.suites.prediction_trial import PredictionTrial
-from motionloom_lab.suites.protocol import check_ranges
+from motionloom_lab.suites.protocol import check_ranges, reported
 from motionloom_train.data.prediction import Protocol
 from motionloom_train.loop import Training, changed
 from motionloom_train.predictor import train_predictor
@@ -144,18 +144,7 @@ def study(name: str, lab: Lab) -> Report:
         columns, rows, said = _steps(lab)
     else:
         columns, rows, said = _trained(name, lab)
-    p, b = lab.protocol, lab.budget
-    about = {
-        "data": p.name,
-        "licence": p.licence,
-        "split": "test",
-        "frames": f"{p.observed} seen, {p.future} predicted",
-        "frames per second": p.fps,
-        "windows": b.windows,
-        "samples": b.samples,
-        "seed": b.seed,
-        **said,
-    }
+    about = reported("study", {"data": lab.protocol, "budget": lab.budget}) | said
     return Report(f"study-{name}", TITLES[name], "", about, tuple(columns), tuple(rows))
 
 
@@ -190,7 +179,7 @@ def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, An
         for steps in (10, 50) if name == "noising" else (STEPS,):
             label = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
             lab.progress(f"{label}: {len(trial.windows)} windows")
-            way = prediction.drawn(predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps)
+            way = prediction.sampled(predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps)
             scored = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
             rows.append(_row(trial, label, scored | {"parameters": size / 1e6}))
     size = Column("parameters", "M parameters", "", "millions", 2)
@@ -247,7 +236,7 @@ def _steps(lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
             found: dict[int, dict[str, float]] = {}
             for steps in reversed(walks):
                 lab.progress(f"{solver}, {spacing}, {steps} steps")
-                way = prediction.drawn(
+                way = prediction.sampled(
                     predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps, solver=solver, spacing=spacing
                 )
                 found[steps] = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)

@@ -96,7 +96,7 @@ def read_test(data: Path | str, name: str | None = None, *, say: Callable[[str],
         plain = path.stem.split("_")[0] in CMU_TEST and not path.stem.endswith(("_looped", "_reversed"))
         clip = read_clip(path) if plain else None
         if clip and clip.source == "cmu" and clip.way == "plain":
-            places = humanml.decode_positions(clip.features.astype(np.float64))
+            places = clip.positions()
             said = next((note.texts[0] for note in clip.notes if note.kind == "index" and note.texts), "motion")
             turned = humanml.resample_positions(places, FPS, target=30.0).astype(np.float32)
             found.append(Recording(clip.name, clip.name.split("_")[0], said, "test", turned))
@@ -169,7 +169,7 @@ def score(
     """
     tally, ways, seconds = metrics.Tally(trial.singles), list[tuple[float, float]](), 0.0
     variety: list[float] = []
-    for number, made, took in _made(trial, way, chunk or max(1, ROWS // max(samples, 1)), say):
+    for number, made, took in _predicted(trial, way, chunk or max(1, ROWS // max(samples, 1)), say):
         truth, past = trial.future(number), trial.pasts(number, number + 1)[0]
         near = trial.futures(number)
         scores = metrics.score_window(
@@ -189,7 +189,7 @@ def score(
     return found | {"seconds": seconds / len(trial.windows)}
 
 
-def _made(
+def _predicted(
     trial: PredictionTrial, way: Way | None, chunk: int, say: Callable[[str], None]
 ) -> Iterator[tuple[int, Array, float]]:
     """Number of each window, its futures (samples, frames, joints, 3), and the seconds that they took."""

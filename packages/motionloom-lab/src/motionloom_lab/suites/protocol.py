@@ -4,13 +4,16 @@ The published protocol (Guo et al. 2022, as MDM and PriorMDM ran it) in its own 
 batches of 32, replications with a 95 % interval of 1.96 sigma / sqrt(replications).
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from string import Formatter
 from typing import Any, Literal, TypedDict
 
 from motionloom.diffusion import SOLVERS
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.reading import read_table
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 
 SPLITS = ("train", "val", "test")
@@ -55,13 +58,14 @@ class Selection:
 
     def described(self) -> dict[str, Any]:
         """For a report."""
-        third = ", a third of them one unit shorter" if self.shorter_third else ""
-        return {
-            "split": list(self.splits),
+        values = {
+            "one": self,
+            "splits": list(self.splits),
             "sources": list(self.sources) or "all",
-            "mirrored copies": "with" if self.mirrored else "without",
-            "real lengths": f"{self.shortest} to {self.longest} frames, cropped to multiples of {self.unit}{third}",
+            "mirrored": "with" if self.mirrored else "without",
+            "third": ", a third of them one unit shorter" if self.shorter_third else "",
         }
+        return reported("selection", values)
 
 
 @dataclass(frozen=True)
@@ -120,27 +124,14 @@ class Transitions:
         """What sampling is asked beside seeds."""
         return {"steps": self.steps, "guidance": self.guidance}
 
-    def drawn(self) -> dict[str, Any]:
+    def sampling(self) -> dict[str, Any]:
         """Everything that changes the motions of one replication: what a resumed run must agree in."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "replications"}
 
     def described(self) -> dict[str, Any]:
         """For a report."""
-        said = f"{self.handshake} frames of handshake, {self.margin} of margin, {self.blend} blended"
-        return {
-            "transitions": said,
-            "unfoldings": self.unfoldings,
-            "intervals": self.intervals,
-            "visible lengths": f"those of real motions, raised to {self.shortest} and cut to {self.longest} frames; "
-            "DoubleTake's rows are longer by half a handshake at each seam, so that all motions have the same frames",
-            "captions": "one per item, items without replacement within a replication, drawn by seed",
-            "steps": self.steps,
-            "sampler": f"{SOLVER}, {SPACING} spacing",
-            "guidance": float(self.guidance),
-            "seed": self.seed,
-            "replications": self.replications,
-            "interval": "1.96 sigma / sqrt(replications)",
-        }
+        values = {"how": self, "solver": SOLVER, "spacing": SPACING, "guidance": float(self.guidance)}
+        return reported("transitions", values)
 
 
 class LongDrawing(TypedDict):
@@ -219,7 +210,7 @@ class Protocol:
         first = self.seed + replication * STRIDE + after
         return list(range(first, first + rows))
 
-    def drawn(self) -> dict[str, Any]:
+    def sampling(self) -> dict[str, Any]:
         """Everything that changes the motions of one replication or their numbers: what a resumed run must agree in."""
         kept = (
             "lengths",
@@ -239,29 +230,22 @@ class Protocol:
         """Everything that a reader needs to judge the numbers, as plain data; no place on anybody's disk."""
         captions, samples = self.multimodality
         several = f"{captions} captions x {samples} motions, in the first {self.multimodal_replications} replications"
-        exact = "exact, from the ground truth" if self.lengths == "exact" else "196 frames, cut to the ground truth's"
-        length = "true" if self.caption_length == "true" else f"{PUBLISHED_CAPTION} for generated motions, as published"
-        return {
-            "data": data,
-            **selection.described(),
-            "items": items,
-            "frames per second": FPS,
-            "representation": "HumanML3D, 263 numbers per frame, as the network draws them (not finished)",
-            "statistics": "those of the evaluator",
-            "evaluator": evaluator,
-            "generated lengths": exact,
-            "caption length": length,
-            "captions": "one per item and replication, drawn by seed",
+        exact = self.lengths == "exact"
+        values = {
+            "how": self,
+            "fps": FPS,
+            "lengths": "exact, from the ground truth" if exact else "196 frames, cut to the ground truth's",
+            "caption_length": "true"
+            if self.caption_length == "true"
+            else f"{PUBLISHED_CAPTION} for generated motions, as published",
             "batch": self.batch or "the whole set",
-            "last partial batch": "dropped" if self.batch else "none",
-            "sampler": f"{self.solver}, {self.spacing} spacing",
+            "partial": "dropped" if self.batch else "none",
             "steps": list(self.steps),
             "guidance": float(self.guidance),
-            "seed": self.seed,
-            "replications": self.replications,
-            "interval": "1.96 sigma / sqrt(replications)",
-            "multimodality": several if captions else "not measured",
+            "several": several if captions else "not measured",
         }
+        chosen = {"data": data, **selection.described(), "items": items, "evaluator": evaluator}
+        return chosen | reported("text", values)
 
 
 def quick(protocol: Protocol) -> Protocol:
@@ -288,3 +272,16 @@ def check_ranges(settings: object, ranges: Mapping[str, tuple[float, float]]) ->
 def _need(fine: bool, message: str) -> None:
     if not fine:
         raise MotionloomError(message)
+
+
+VALUE = re.compile(r"\{([\w.]+)\}")
+"""A text that is a value and nothing else."""
+
+
+def reported(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """What a report says of how it was measured: a table of ``protocols.toml`` with the values that its texts name."""
+    found: dict[str, Any] = {}
+    for name, text in read_table("motionloom_lab.suites", "protocols.toml")[table].items():
+        alone = VALUE.fullmatch(text)
+        found[name] = Formatter().get_field(alone[1], (), values)[0] if alone else text.format(**values)
+    return found

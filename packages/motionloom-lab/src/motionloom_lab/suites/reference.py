@@ -4,12 +4,11 @@
 so that tables can show them where no recordings are at hand. `motionloom evaluate reference` makes it anew.
 """
 
-import json
 from collections.abc import Callable, Iterable, Sequence
-from importlib import resources
 from typing import Any
 
 from motionloom.features.layout import FPS
+from motionloom.reading import read_table
 from motionloom_lab.metrics.actions import Measures, measure
 from motionloom_lab.metrics.obedience import CHECKS, Check
 from motionloom_lab.metrics.realism import average
@@ -18,8 +17,7 @@ from motionloom_lab.suites.clips import RealClip
 
 def known() -> dict[str, Any]:
     """The shipped numbers."""
-    place = resources.files("motionloom_lab.suites") / "reference.json"
-    return json.loads(place.read_text(encoding="utf-8"))
+    return read_table("motionloom_lab.suites", "reference.json")
 
 
 def reference(clips: Iterable[RealClip], progress: Callable[[str], None] = lambda line: None) -> dict[str, Any]:

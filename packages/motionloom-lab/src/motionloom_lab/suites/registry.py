@@ -4,14 +4,13 @@ A further suite is one more table there and a function in `lab.suites.measures`.
 """
 
 import shlex
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
 from motionloom.errors import MotionloomError
+from motionloom.reading import read_table
 from motionloom.weights.prior import Prior, find_weights, shipped
 from motionloom_lab.report.report import Report
 from motionloom_lab.suites import measures, needs
@@ -146,10 +145,7 @@ def _suite(name: str, row: Asked) -> Suite:
 
 
 SUITES: tuple[Suite, ...] = tuple(
-    _suite(name, row)
-    for name, row in tomllib.loads(
-        (resources.files("motionloom_lab.suites") / "suites.toml").read_text(encoding="utf-8")
-    ).items()
+    _suite(name, row) for name, row in read_table("motionloom_lab.suites", "suites.toml").items()
 )
 
 

@@ -79,7 +79,7 @@ class TextTrial:
         chosen = pick(self.real.captions, rng)
         return chosen, rng.permutation(len(chosen)), rng
 
-    def said(self, chosen: Sequence[int]) -> list[str]:
+    def sentences(self, chosen: Sequence[int]) -> list[str]:
         """The chosen captions in words."""
         return [several[k].text for several, k in zip(self.real.captions, chosen, strict=True)]
 
@@ -141,7 +141,7 @@ def of_real(trial: TextTrial, replication: int, *, shuffled: bool = False) -> di
     """Real motions with their captions, or with anybody's: the captions then are dealt out anew over all items."""
     chosen, order, rng = trial.shuffle(replication)
     texts = np.stack([several[k] for several, k in zip(trial.texts, chosen, strict=True)])
-    motions, said = trial.real.motions, trial.said(chosen)
+    motions, said = trial.real.motions, trial.sentences(chosen)
     if shuffled:
         dealt = rng.permutation(len(texts))
         return matched(trial, texts[dealt][order], motions[order], [said[k] for k in dealt[order]])
@@ -153,9 +153,9 @@ def of_real(trial: TextTrial, replication: int, *, shuffled: bool = False) -> di
 def of_generated(trial: TextTrial, replication: int, steps: int) -> dict[str, float]:
     """One motion per item, measured; the time goes to sampling alone."""
     chosen, order, _ = trial.shuffle(replication)
-    said, frames = trial.said(chosen), trial.real.frames
+    said, frames = trial.sentences(chosen), trial.real.frames
     start = time.perf_counter()
-    drawn = _drawn(trial, said, frames, seeds=trial.protocol.seeds(replication, len(said)), steps=steps)
+    drawn = _sampled(trial, said, frames, seeds=trial.protocol.seeds(replication, len(said)), steps=steps)
     seconds = time.perf_counter() - start
     motions = embedded(trial.evaluator, drawn)
     texts = np.stack([several[k] for several, k in zip(trial.read, chosen, strict=True)])
@@ -169,7 +169,7 @@ def of_generated(trial: TextTrial, replication: int, steps: int) -> dict[str, fl
     return found
 
 
-def _drawn(
+def _sampled(
     trial: TextTrial, said: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
 ) -> list[np.ndarray]:
     """Motions of the wanted lengths, cut to them where they are generated longer."""
@@ -185,9 +185,9 @@ def _several(trial: TextTrial, replication: int, steps: int, *, captions: int, s
     """MultiModality of different motions of one caption: unlike the published draw, none is paired with itself."""
     chosen, order, rng = trial.shuffle(replication)
     items = order[:captions]
-    said, frames = trial.said(chosen), trial.real.frames
+    said, frames = trial.sentences(chosen), trial.real.frames
     seeds = trial.protocol.seeds(replication, len(items) * samples, after=len(said))
-    drawn = _drawn(
+    drawn = _sampled(
         trial,
         [said[k] for k in items for _ in range(samples)],
         [frames[k] for k in items for _ in range(samples)],
@@ -284,7 +284,7 @@ def run(
     if protocol.caption_length == "published":
         _as_published(judge, [text_reference.SENTENCE])
     trial = prepare(draw, judge, reference(judge, run.data, selection, run.progress), protocol)
-    parts = run.parts({**protocol.drawn(), **run.settings(judge), "real": identity(trial.real)})
+    parts = run.parts({**protocol.sampling(), **run.settings(judge), "real": identity(trial.real)})
     return measure(trial, run, parts=parts, memory=memory)
 
 

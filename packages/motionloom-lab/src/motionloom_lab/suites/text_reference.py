@@ -113,7 +113,7 @@ def probe(evaluator: Evaluator) -> Array:
     return np.concatenate([texts, evaluator.motions([0.1 * wave])]).astype(np.float64)
 
 
-def known_again(reference: TextReference, evaluator: Evaluator) -> bool:
+def made_by(reference: TextReference, evaluator: Evaluator) -> bool:
     """Is this the evaluator that the reference was made with? Up to rounding, which differs between machines."""
     found = probe(evaluator)
     return found.shape == reference.probe.shape and bool(
@@ -124,8 +124,7 @@ def known_again(reference: TextReference, evaluator: Evaluator) -> bool:
 def save(reference: TextReference, path: Path | str) -> Path:
     """Write a .safetensors file, whole or not at all; embeddings as float16."""
     path = Path(path)
-    if path.suffix != ".safetensors":
-        raise MotionloomError(f"a reference is written as .safetensors; {path.name} has another suffix")
+    check_reference(path)
     values = {
         "motions": reference.motions,
         "frames": np.array(reference.frames),
@@ -179,7 +178,7 @@ def load(path: Path | str, evaluator: Evaluator) -> TextReference:
     except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         reason = " ".join(str(error).split())[:160]
         raise MotionloomError(f"{path} is not a reference of real motions ({reason}); make it again") from None
-    if not known_again(reference, evaluator):
+    if not made_by(reference, evaluator):
         raise MotionloomError(
             f"{path.name} was made with another evaluator ({reference.evaluator!r}) than {evaluator.name!r}; "
             "name real motions with --data"
@@ -193,7 +192,7 @@ def _decoded(about: dict[str, Any], found: dict[str, np.ndarray]) -> TextReferen
     for name, kind in _KINDS.items():
         if found[name].dtype != kind or not np.isfinite(found[name]).all():
             raise ValueError(f"{name} holds other numbers than finite {np.dtype(kind).name}")
-    names = tuple(map(_said, about["names"]))
+    names = tuple(map(_short_text, about["names"]))
     count, width = len(names), found["probe"].shape[-1]
     shapes = {"motions": (count, width), "frames": (count,), "physical": (count, len(PHYSICAL)), "probe": (2, width)}
     if not 1 <= count <= MOST_ITEMS or any(found[name].shape != shape for name, shape in shapes.items()):
@@ -206,7 +205,7 @@ def _decoded(about: dict[str, Any], found: dict[str, np.ndarray]) -> TextReferen
     if not all(selection.shortest <= n <= selection.longest for n in frames):
         raise ValueError("it has lengths that were not selected")
     motions, physicals, seen = (found[name].astype(np.float64) for name in ("motions", "physical", "probe"))
-    return TextReference(names, captions, frames, motions, physicals, selection, _said(about["evaluator"]), seen)
+    return TextReference(names, captions, frames, motions, physicals, selection, _short_text(about["evaluator"]), seen)
 
 
 def _selection(found: dict[str, Any]) -> Selection:
@@ -214,18 +213,18 @@ def _selection(found: dict[str, Any]) -> Selection:
     flags = [found[name] for name in ("mirrored", "shorter_third")]
     if not all(type(n) is int for n in numbers) or not all(isinstance(flag, bool) for flag in flags):
         raise ValueError("its selection says what cannot be")
-    splits, sources = (tuple(map(_said, found[name])) for name in ("splits", "sources"))
+    splits, sources = (tuple(map(_short_text, found[name])) for name in ("splits", "sources"))
     return Selection(splits, sources, flags[0], numbers[0], numbers[1], numbers[2], flags[1])
 
 
 def _caption(found: Any) -> Caption:
     text, tokens = found
-    if not _said(text).strip():
+    if not _short_text(text).strip():
         raise ValueError("a caption is empty")
-    return Caption(text, tuple(map(_said, tokens)))
+    return Caption(text, tuple(map(_short_text, tokens)))
 
 
-def _said(value: Any) -> str:
+def _short_text(value: Any) -> str:
     if not isinstance(value, str) or len(value) > 2000:
         raise ValueError("it has something else where a short text belongs")
     return value

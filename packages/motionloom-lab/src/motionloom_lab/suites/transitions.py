@@ -57,7 +57,7 @@ class SeamTrial:
     """Windows of real motion; None where only the shipped numbers are at hand."""
     shipped: Shipped | None = None
 
-    def asked(self, replication: int) -> Iterator[tuple[list[int], list[Caption], list[int]]]:
+    def requests(self, replication: int) -> Iterator[tuple[list[int], list[Caption], list[int]]]:
         """For each long motion of a replication: its items, their captions, and the visible frames."""
         rng = np.random.default_rng((self.how.seed, replication))
         order = rng.permutation(len(self.real.names))
@@ -115,7 +115,7 @@ def of_method(trial: SeamTrial, method: Method, replication: int) -> dict[str, f
     how = trial.how
     middles, seams, said, around, inside, steps = [], [], [], [], [], []
     spent = total = 0.0
-    for unfolding, (_, captions, frames) in enumerate(trial.asked(replication)):
+    for unfolding, (_, captions, frames) in enumerate(trial.requests(replication)):
         start = time.perf_counter()
         made = method([caption.text for caption in captions], frames, how.first_seed(replication, unfolding))
         spent, total = spent + time.perf_counter() - start, total + sum(frames) / FPS
@@ -139,8 +139,8 @@ def of_method(trial: SeamTrial, method: Method, replication: int) -> dict[str, f
 
 def of_real(trial: SeamTrial, replication: int) -> dict[str, float]:
     """Real motions with their own captions; other random windows of real motion in place of transitions."""
-    rows = [item for items, _, _ in trial.asked(replication) for item in items]
-    said = [caption for _, captions, _ in trial.asked(replication) for caption in captions]
+    rows = [item for items, _, _ in trial.requests(replication) for item in items]
+    said = [caption for _, captions, _ in trial.requests(replication) for caption in captions]
     found = _matched(trial, said, trial.real.motions[rows], replication)
     numbers = harness.averaged(trial.real.physical, trial.real.frames)
     found |= {f"inside_{short}": numbers[name] for short, name in PHYSICAL.items()}
@@ -248,7 +248,7 @@ def run(
     judge = run.judge()
     trial = real_motion(judge, run.data, selection, how, run.progress)
     windows = {"windows": trial.crops is not None}
-    parts = run.parts({**how.drawn(), **run.settings(judge), "real": identity(trial.real), **windows})
+    parts = run.parts({**how.sampling(), **run.settings(judge), "real": identity(trial.real), **windows})
     return measure(trial, ways, run, parts=parts)
 
 

@@ -227,7 +227,9 @@ def tried(
             passed, count = getattr(tally, kind)
             setattr(tally, kind, (passed + ok, count + 1))
             if not ok and kind != "opposite":
-                tally.missed.append(f"{name}: {', '.join(_said(b.measure, numbers) for b in check.failed(numbers))}")
+                tally.missed.append(
+                    f"{name}: {', '.join(_measured_text(b.measure, numbers) for b in check.failed(numbers))}"
+                )
             if ok and kind == "opposite":
                 tally.slipped.append(f"{name} (the other side)")
         wrong = [(c, check.obeyed(check.of(bodies[id(c)]))) for c in others(trial, clips)]
@@ -240,7 +242,7 @@ def tried(
     return found
 
 
-def _said(name: str, numbers: Mapping[str, float]) -> str:
+def _measured_text(name: str, numbers: Mapping[str, float]) -> str:
     return f"{name} {numbers[name]:g}"
 
 

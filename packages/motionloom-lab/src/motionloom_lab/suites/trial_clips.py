@@ -1,16 +1,14 @@
 """Which real clips show what, for the trial of the everyday checks: `trial_clips.toml` as `Examples`."""
 
-import tomllib
-from importlib import resources
 from typing import Any
 
+from motionloom.reading import read_table
 from motionloom_lab.suites.trial import NOTHING, Examples
 
 
 def trials() -> dict[str, Examples]:
     """How to find examples, by the name of the check."""
-    place = resources.files("motionloom_lab.suites") / "trial_clips.toml"
-    found = tomllib.loads(place.read_text(encoding="utf-8"))
+    found = read_table("motionloom_lab.suites", "trial_clips.toml")
     words = {f"@{name}": "|".join(items) for name, items in found.pop("words").items()}
     return {name: _trial(entry, words) for name, entry in found.items()}
 

@@ -2,9 +2,9 @@
 
 import argparse
 from importlib import import_module
-from pathlib import Path
 
-from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.cli.tables import add_family
+from motionloom.cli.writing import check_overwriting
 
 READERS = "motionloom_lab.papers.readers"
 """The module of the laboratory that knows the data sets that others published."""
@@ -12,48 +12,11 @@ READERS = "motionloom_lab.papers.readers"
 
 def add(subparsers) -> None:
     """Register `data build` and `data look`."""
-    data = subparsers.add_parser("data", help="turn recordings into a training set")
-    commands = data.add_subparsers(metavar="COMMAND", required=True)
-    build = commands.add_parser(
-        "build", help="features, captions, splits, mirrored copies, mean and std from folders of recordings"
-    )
-    build.add_argument("folders", nargs="+", type=Path, help="the mocap pack, a CMU download, a HumanML3D folder")
-    build.add_argument("--out", type=Path, required=True, help="folder of the built set; a build that stopped goes on")
-    build.add_argument("--captions", type=Path, help="humanml3d.jsonl(.gz) with captions for a CMU download")
-    build.add_argument("--workers", type=int, default=2, help="processes (default 2)")
-    build.add_argument(
-        "--mixed",
-        type=int,
-        default=700,
-        help="clips of each kind made from others: arms of one on another's walk, two actions in a row, gestures "
-        "(default 700)",
-    )
-    build.add_argument(
-        "--exclude",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="leave out the takes whose names begin so, and all that would be made of them; may be given again",
-    )
-    build.add_argument(
-        "--allow",
-        action="append",
-        default=[],
-        metavar="NAME[=REASON]",
-        help="let in the takes whose names begin so though their bodies do not do what was recorded; the reason stands "
-        "in set.json; may be given again",
-    )
-    build.set_defaults(run=_build)
-    look = commands.add_parser("look", help="a page of pictures: recordings beside the clips that were made of them")
-    look.add_argument("set", type=Path, metavar="SET", help="folder of a built set")
-    look.add_argument("folders", nargs="+", type=Path, help="the recordings that it was made of")
-    look.add_argument("--out", type=Path, required=True, help="picture to write, .png")
-    look.add_argument("--each", type=int, default=2, metavar="N", help="clips of each source (default 2)")
-    add_force(look)
-    look.set_defaults(run=_look)
+    add_family(subparsers, __name__)
 
 
-def _build(arguments: argparse.Namespace) -> None:
+def run_build(arguments: argparse.Namespace) -> None:
+    """``motionloom data build``."""
     from motionloom_train.data.build import build
 
     build(
@@ -73,7 +36,8 @@ def _reasons(said: list[str]) -> dict[str, str]:
     return {name: reason for name, _, reason in (text.partition("=") for text in said)}
 
 
-def _look(arguments: argparse.Namespace) -> None:
+def run_look(arguments: argparse.Namespace) -> None:
+    """``motionloom data look``."""
     from motionloom_train.data.look import draw_look
 
     check_overwriting(arguments, [arguments.out])

@@ -7,45 +7,20 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.options import add_options
-from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import fail, request_of
-from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.cli.tables import add_family
+from motionloom.cli.writing import check_overwriting
 from motionloom.errors import MotionloomError
 from motionloom.formats import readable
-from motionloom.requests.export import Source
-from motionloom.requests.teach import Teach
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom_train.data.examples import CaptionedClip, Example
 
 
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(subparsers) -> None:
     """Register `teach`."""
-    parser = subparsers.add_parser(
-        "teach",
-        help="teach the shipped weights an action or a style from a few clips",
-        description="Learn from 1 to 20 clips of one person, of any humanoid skeleton: see docs/teach.md. The file "
-        "that is written goes with --adapter into generate, compose, control, edit and duet.",
-    )
-    parser.add_argument(
-        "words",
-        nargs="+",
-        metavar="TEXT|CLIP",
-        help="what the clips show, such as 'a zombie walks', and motion files or folders of them",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the adapter (default taught.safetensors)")
-    parser.add_argument("--check", action="store_true", help="only say what is wrong with the clips")
-    add_options(parser, Teach)
-    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="what is taught (default: default)")
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--threads", type=int, help="CPU threads")
-    parser.add_argument("--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF: m, cm, inch, or metres")
-    add_options(parser, Source, helps={"up": "the axis that is up in the files; without it y"})
-    parser.add_argument("--json", action="store_true", help="print what was made or found as JSON")
-    add_force(parser)
-    parser.set_defaults(run=run_teach)
+    add_family(subparsers, __name__)
 
 
 def run_teach(arguments: argparse.Namespace) -> int:

@@ -4,10 +4,8 @@ Training draws evenly over actions instead of over captions (`data.sets`), so th
 """
 
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Literal
 
 import numpy as np
@@ -15,6 +13,7 @@ import numpy as np
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.gestures import wrist_thrust
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_table
 from motionloom_train.data.words import sentence
 
 Kind = Literal["cycle", "repeats", "change", "once", "state"]
@@ -63,7 +62,7 @@ def _in_order(pattern: str, text: str) -> bool:
 
 
 def _read() -> dict[str, Action]:
-    table = tomllib.loads((resources.files("motionloom_train.data") / "actions.toml").read_text(encoding="utf-8"))
+    table = read_table("motionloom_train.data", "actions.toml")
     made = {}
     for name, entry in table.items():
         words = entry.pop("words")

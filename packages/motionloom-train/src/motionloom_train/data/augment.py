@@ -88,7 +88,7 @@ def can_hold(positions: Array, fps: float, *, end: bool, fastest: float = 0.45) 
     return bool(moved.mean() < fastest and moved[:, 0].mean() < 0.75 * fastest and few[..., 1].min() < lowest + 0.12)
 
 
-def held(positions: Array, before: int, after: int, *, fps: float, seed: int, idle: Idle = NO_IDLE) -> Array:
+def with_pauses(positions: Array, before: int, after: int, *, fps: float, seed: int, idle: Idle = NO_IDLE) -> Array:
     """What was before and after a stretch (frames, 22, 3): ``before`` and ``after`` more frames of somebody alive.
 
     Where an end stands as people in ``idle`` do, one of those recordings leads to it or goes on from it. Any other pose

@@ -1,9 +1,7 @@
 """Training batches: which windows of a set are drawn, and how often."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +10,7 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
+from motionloom.reading import read_table
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.clips import MADE
 from motionloom_train.data.sets import Item, MotionSet
@@ -19,7 +18,7 @@ from motionloom_train.data.sets import Item, MotionSet
 SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
 """How often a training sample shows a named action, a written caption, an index description, a measured label."""
 
-_ROWS = tomllib.loads((resources.files("motionloom_train.data") / "favour.toml").read_text(encoding="utf-8"))
+_ROWS = read_table("motionloom_train.data", "favour.toml")
 FAVOUR: dict[str, float] = _ROWS["labels"] | {f"action:{name}": often for name, often in _ROWS["actions"].items()}
 """Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
 labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""

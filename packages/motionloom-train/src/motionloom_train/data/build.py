@@ -31,7 +31,7 @@ from motionloom.io.atomic import atomic_path, finished, sweep
 from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment, gate
 from motionloom_train.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to
-from motionloom_train.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write_clip
+from motionloom_train.data.clips import SHORTEST, Clip, Note, read_clip, write_clip
 from motionloom_train.data.derived import (
     LOOPED,
     SEATED,
@@ -50,7 +50,7 @@ from motionloom_train.data.made import hands_up
 from motionloom_train.data.person import uniform_person
 from motionloom_train.data.sources import Places, Span, Take, find_takes
 from motionloom_train.data.windows import label_clip
-from motionloom_train.data.words import mirror_text
+from motionloom_train.data.words import STATES, mirror_text
 
 _DERIVED = re.compile(r"M?(held|mixed|joined|made|posture|there)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")

@@ -8,9 +8,11 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 
 from motionloom.errors import MotionloomError
+from motionloom.features.humanml import decode_positions
 from motionloom.features.layout import WIDTH
 from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
+from motionloom.kinematics.physics import Array
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.words import LABELS, check_caption
 
@@ -21,25 +23,6 @@ SHORTEST = 20
 THEN, MADE = "then", "made "
 """Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
 KINDS = ("capture", "keyed", "made")
-STATES = (
-    "walk",
-    "walk slow",
-    "walk fast",
-    "jog",
-    "run",
-    "walk backward",
-    "jog backward",
-    "stand",
-    "dance",
-    "circle left",
-    "circle right",
-    "run circle",
-    "balance",
-    "sidestep left",
-    "sidestep right",
-    "sit",
-)
-"""Labels that stay true however long a window of them is: neighbouring windows join."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +55,10 @@ class Clip:
     """(frames, 263) float32, not standardised."""
     kind: str = "capture"
     """``capture``, ``keyed`` (animated by hand) or ``made`` (arms moved by rule on a recorded body)."""
+
+    def positions(self, first: int = 0, last: int | None = None) -> Array:
+        """(frames, 22, 3) metres of a stretch of frames, or of all."""
+        return decode_positions(self.features[first:last].astype(np.float64))
 
 
 def write_clip(folder: Path, clip: Clip) -> None:

@@ -16,24 +16,10 @@ from motionloom_train.data.idle import Idle
 from motionloom_train.data.made import GESTURES, Gesture, hands_up, lower_arms, perform, words_for
 from motionloom_train.data.person import at_origin
 from motionloom_train.data.postures import Posture, assume, postures
-from motionloom_train.data.words import sentence
+from motionloom_train.data.words import POSTURES, sentence
 
 LOOPED = 200
 """Frames that a cycle is repeated to."""
-POSTURES = (
-    "sit down",
-    "stand up",
-    "sit down and stand up",
-    "lie down",
-    "get up",
-    "crouch to lie",
-    "lie to crouch",
-    "kneel",
-    "crouch",
-    "bow",
-    "fall",
-)
-"""Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
 BRIEFLY = 20
 """Frames for which a pose is held in which nobody stays."""
 LYING = 80
@@ -61,7 +47,7 @@ def held_clips(clips: Sequence[Clip], idle: Idle) -> Iterator[Clip]:
     for clip in clips:
         if clip.way != "plain" or clip.split != "train" or clip.name.startswith("M"):
             continue
-        positions = hml.decode_positions(clip.features.astype(np.float64))
+        positions = clip.positions()
         seed = int.from_bytes(clip.name.encode(), "little") % 2**32
         made = 0
         for number, note in enumerate(_actions(clip)):
@@ -109,7 +95,7 @@ def _held(
     if not posture:  # nobody stays in the middle of a movement
         before = before if augment.stands_on(shown[0], idle) else min(before, BRIEFLY)
         after = after if augment.stands_on(shown[-1], idle) else min(after, BRIEFLY)
-    longer = augment.held(shown, before, after, fps=FPS, seed=seed, idle=idle)
+    longer = augment.with_pauses(shown, before, after, fps=FPS, seed=seed, idle=idle)
     features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
     whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
     low = {"lie down": shown[-1], "get up": shown[0]}.get(kind.removeprefix(PREFIX))
@@ -170,11 +156,11 @@ def sat_and_risen(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
         if made >= count or clip.way != "plain":
             continue
         first, last = note.core or (note.first, note.last)
-        shown = hml.decode_positions(clip.features[first:last].astype(np.float64))
+        shown = clip.positions(first, last)
         shown = lower_arms(shown) if hands_up(shown) else shown
         if not (28 <= len(shown) <= 60 and augment.can_hold(shown, FPS, end=True, fastest=1.2)):
             continue
-        sat = augment.held(shown, 0, int(rng.integers(12, 24)), fps=FPS, seed=seed * 100_003 + number)
+        sat = augment.with_pauses(shown, 0, int(rng.integers(12, 24)), fps=FPS, seed=seed * 100_003 + number)
         both = augment.joined(sat, augment.reversed_in_time(shown), limit=0.3)
         if both is None:
             continue
@@ -244,7 +230,7 @@ def _core_positions(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
     if note.core is None and last - first > 70:
         first += int(rng.integers(last - first - 60))
         last = first + 60
-    return hml.decode_positions(clip.features[first:last].astype(np.float64))
+    return clip.positions(first, last)
 
 
 def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
@@ -304,14 +290,14 @@ def _gesturing(
         length = min(note.core[1] + 25, note.last) - first
         begin = (note.core[1] - first) / FPS
     alive = idle.body(frames, rng) if where == "stand" else None
-    body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
+    body = below.positions(first, first + length)
     body = at_origin(body if alive is None else alive)
     if where == "stand" and alive is None and rng.random() < 0.7:
         body = lower_arms(body)
     needed = max(round(FPS * (begin + 1.5 * gesture.times)), 0 if where == "walk" else SHOWN)
     needed = max(needed, round(FPS * begin) + 60) if where == "stop" else needed
     if needed > len(body):
-        body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed, idle=idle)
+        body = augment.with_pauses(body, 0, needed - len(body), fps=FPS, seed=seed, idle=idle)
     return body, begin
 
 
@@ -329,7 +315,9 @@ def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = a
         above, gesture_note = arms[gesture][rng.integers(len(arms[gesture]))]
         if below.licence != above.licence:
             continue
-        worn = augment.wear_arms(_positions(below, note), _positions(above, gesture_note))
+        worn = augment.wear_arms(
+            below.positions(note.first, note.last), above.positions(gesture_note.first, gesture_note.last)
+        )
         features = hml.encode(worn, heading="corrected")
         features[:, LAYOUT["root_height"]] = below.features[
             note.first : note.first + len(features), LAYOUT["root_height"]
@@ -354,10 +342,6 @@ def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tu
     return found
 
 
-def _positions(clip: Clip, note: Note) -> Array:
-    return hml.decode_positions(clip.features[note.first : note.last].astype(np.float64))
-
-
 def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """Changes of the whole body (`data.postures`) on people who stand with hanging arms; training clips of one licence.
 
@@ -369,10 +353,12 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
         below, note = bodies[rng.integers(len(bodies))]
         body = idle.body(LOOPED, rng)
         if body is None:
-            body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
+            body = below.positions(note.first, note.first + 60)
             if rng.random() < 0.7:
                 body = lower_arms(body)
-        body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number, idle=idle)
+        body = augment.with_pauses(
+            body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number, idle=idle
+        )
         for kind, posture in enumerate(postures(body, rng)):
             begin = float(rng.uniform(0.8, 1.0))
             frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
@@ -398,7 +384,7 @@ def _stands_plainly(clip: Clip, note: Note) -> bool:
     """Both feet side by side and both hands down."""
     if clip.way not in ("plain", "held"):
         return False
-    p = ph.in_body(hml.decode_positions(clip.features[note.first : note.first + 60].astype(np.float64)))
+    p = ph.in_body(clip.positions(note.first, note.first + 60))
     step = np.abs(p[:, 7, 2] - p[:, 8, 2]).max()
     return bool(step < 0.12 and p[:, [20, 21], 1].max() < p[:, 6, 1].min() and p[..., 1].min() > -0.02)
 
@@ -433,14 +419,14 @@ def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle 
 def _walk(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
     length = min(note.last - note.first, 80)
     first = note.first + int(rng.integers(note.last - note.first - length + 1))
-    return hml.decode_positions(clip.features[first : first + length].astype(np.float64))
+    return clip.positions(first, first + length)
 
 
 def _half_turns(clip: Clip) -> Iterator[tuple[Clip, Array]]:
     """Stretches of a training recording within which somebody who walks turns right round and walks on."""
     if clip.split != "train" or clip.way != "plain" or not any(n.kind.startswith("walk turn back") for n in clip.notes):
         return
-    p = hml.decode_positions(clip.features.astype(np.float64))
+    p = clip.positions()
     heading = np.degrees(ph.smooth(np.unwrap(ph.heading(p)), 21))
     for length in (30, 40, 50, 60):
         for first in range(15, len(p) - length - 15, 8):

@@ -171,7 +171,7 @@ def _example(motion: Motion, captioned: CaptionedClip) -> Example:
     if looped is not None:
         return Example(name, captioned.captions, looped, (0, len(looped)), looped=True)
     more = LENGTH - count
-    longer = augment.held(positions, more, more, fps=FPS, seed=0)
+    longer = augment.with_pauses(positions, more, more, fps=FPS, seed=0)
     return Example(name, captioned.captions, hml.encode(longer, heading="corrected"), (more, more + count))
 
 

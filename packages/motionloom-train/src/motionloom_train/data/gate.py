@@ -47,7 +47,7 @@ class Compared:
 
 def fidelity_of(places: Places, clip: Clip) -> Fidelity:
     """How truly a built clip, whole and not mirrored, shows its recording."""
-    built = hml.decode_positions(clip.features.astype(np.float64))
+    built = clip.positions()
     own = hml.resample_positions(places.own, places.fps)[: len(built)]
     return compare(own, built)
 

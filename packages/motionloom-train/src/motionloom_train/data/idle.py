@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
@@ -79,8 +78,8 @@ def find_idle(clips: Sequence[Clip]) -> Idle:
     for clip in clips:
         if clip.way != "plain" or clip.split != "train" or clip.kind != "capture" or clip.name.startswith("M"):
             continue
-        positions = hml.decode_positions(clip.features.astype(np.float64))
-        for first, last in _spans(_stands(positions)):
+        positions = clip.positions()
+        for first, last in _spans(_is_standing(positions)):
             alive = _liveliness(positions[first:last])
             if alive >= _ALIVE:
                 found.append((alive, positions[first:last]))
@@ -88,7 +87,7 @@ def find_idle(clips: Sequence[Clip]) -> Idle:
     return Idle(tuple(stretch for _, stretch in found[:MOST]))
 
 
-def _stands(positions: Array) -> np.ndarray:
+def _is_standing(positions: Array) -> np.ndarray:
     """(frames,) bool: upright on both planted feet that are side by side, with hanging hands that do nothing fast."""
     speed = np.linalg.norm(ph.velocity(positions, FPS), axis=-1)
     trunk = positions[:, [16, 17]].mean(axis=1) - positions[:, [1, 2]].mean(axis=1)

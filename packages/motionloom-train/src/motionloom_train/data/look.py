@@ -114,7 +114,7 @@ def _pair(built_set: Path, take: Take, compared: gate.Compared) -> Pair:
     made = next(clips_of(take, check=lambda places, clip: read.append(places)))
     kept = built_set / "clips" / f"{take.name}.safetensors"
     clip = read_clip(kept) if kept.is_file() else made
-    built = hml.decode_positions(clip.features.astype(np.float64))
+    built = clip.positions()
     own = hml.resample_positions(read[0].own, read[0].fps)[: len(built)]
     median, high = compared.directions["all"]
     verdict = "refused" if compared.refused else "allowed" if compared.allowed else ""

@@ -5,15 +5,14 @@ or walks; the wrists go there and back by a smooth path, and the elbows follow i
 else of the recording stays. Clips made so are marked (``way`` ``made``) and used in training only.
 """
 
-import tomllib
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_table
 from motionloom.retarget import limbs
 from motionloom_train.data.words import sentence
 
@@ -46,9 +45,7 @@ class Gesture:
 
 
 def _read() -> dict[str, Gesture]:
-    table: dict[str, dict[str, Any]] = tomllib.loads(
-        (resources.files("motionloom_train.data") / "gestures.toml").read_text(encoding="utf-8")
-    )
+    table: dict[str, dict[str, Any]] = read_table("motionloom_train.data", "gestures.toml")
     values: dict[str, dict[str, Any]] = {
         name: {key: tuple(part) if isinstance(part, list) else part for key, part in entry.items()}
         for name, entry in table.items()

@@ -6,9 +6,8 @@ arm to ask a question" or "stoop and grab it", and a network that never read suc
 
 import functools
 import re
-import tomllib
-from importlib import resources
 
+from motionloom.reading import read_table
 from motionloom_train.data.actions import ACTIONS, PREFIX, side_of
 from motionloom_train.data.clips import MADE, Note
 
@@ -16,7 +15,7 @@ from motionloom_train.data.clips import MADE, Note
 @functools.cache
 def table() -> dict[str, dict[str, list[str]]]:
     """``action:NAME``, ``gesture:NAME`` or ``label:NAME`` to ``says``, and ``sided`` with ``{side}``."""
-    return tomllib.loads((resources.files("motionloom_train.data") / "sayings.toml").read_text(encoding="utf-8"))
+    return read_table("motionloom_train.data", "sayings.toml")
 
 
 def sayings(note: Note) -> tuple[str, ...]:

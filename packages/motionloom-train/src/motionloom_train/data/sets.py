@@ -10,37 +10,21 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT
 from motionloom.io.atomic import finished
 from motionloom.io.text import parse_json, read_utf8
 from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
-from motionloom_train.data.clips import MADE, STATES, Clip, Note, read_clip
+from motionloom_train.data.clips import MADE, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
 from motionloom_train.data.sayings import sayings
-from motionloom_train.data.words import phrases, sentence
+from motionloom_train.data.words import EVENTS, STATES, phrases, sentence
 
 WORDINGS = 48
 """Sentences made per measured label."""
 WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 """How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
 
-EVENTS = {
-    "kick": "kick",
-    "kick ball": "kick",
-    "punch": "punch|box",
-    "jump": "jump|leap",
-    "jump forward": "jump|leap",
-    "jump repeatedly": "jump|leap",
-    "hop": r"\bhop",
-    "climb": "climb|stairs|ladder",
-    "wave": r"\bwav",
-    "sit down": r"\bsits? down|takes a seat|sitting down",
-    "stand up": r"stands? up|gets? up|rises",
-    "cartwheel": "cartwheel",
-}
-"""Measured labels of something that happens at one moment, and how captions speak of it."""
 STRIKES = {"kick": "foot", "punch": "hand"}
 """How the measured labels begin that name a strike, and the limb that strikes."""
 _MAX_SUMMARY = 64 << 20
@@ -178,7 +162,7 @@ def _when(
     repeats = action is not None and action.kind == "repeats"
     if not limb and not repeats:
         return core, []
-    positions = hml.decode_positions(clip.features[first:last].astype(np.float64))
+    positions = clip.positions(first, last)
     if repeats:
         return None, [first + rest for rest in rests_of(positions, FPS)]
     (begin, end), _ = strike(positions, FPS, limb, side=side)

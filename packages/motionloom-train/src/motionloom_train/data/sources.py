@@ -7,6 +7,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -178,8 +179,8 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
         if name.startswith("M"):
             continue  # mirrored copies are made here
         said = tuple(_texts(folder / "texts" / f"{name}.txt"))
-        features = _features(inside(folder, f"new_joint_vecs/{name}.npy"))
-        yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, said, features)
+        read = partial(read_features, inside(folder, f"new_joint_vecs/{name}.npy"))
+        yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, said, read)
 
 
 def listed_names(folder: Path, splits: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -227,17 +228,15 @@ def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[]
     return lambda: places_of(load(path, fps=fps, unit=unit))
 
 
-def _features(path: Path) -> Callable[[], np.ndarray]:
-    def read() -> np.ndarray:
-        features = read_array(path)
-        if features.ndim != 2 or features.shape[1] != WIDTH or features.dtype.kind != "f":
-            raise MotionloomError(
-                f"{path} is not an array of features: it is {features.dtype} of the shape {features.shape} "
-                f"and not (frames, {WIDTH})"
-            )
-        return np.array(features, dtype=np.float32)
-
-    return read
+def read_features(path: Path) -> np.ndarray:
+    """An array of features (frames, 263), as float32; raises MotionloomError for any other, and for NaN in it."""
+    found = read_array(path)
+    if found.ndim != 2 or found.shape[1] != WIDTH or found.dtype.kind != "f" or not np.isfinite(found).all():
+        raise MotionloomError(
+            f"{path} is not an array of finite features (frames, {WIDTH}), but {found.dtype} of the shape "
+            f"{found.shape}; fetch it again"
+        )
+    return np.array(found, dtype=np.float32)
 
 
 def _json_lines(path: Path) -> Iterator[dict]:

@@ -9,9 +9,7 @@ clip's own text names the action. They describe training windows only and share 
 import functools
 import operator
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +17,7 @@ import numpy as np
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.gestures import longest, wrist_thrust
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_table
 
 Measures = dict[str, float]
 _ANKLES, _FEET, _WRISTS, _SHOULDERS, _HIPS = [7, 8], [7, 8, 10, 11], [20, 21], [16, 17], [1, 2]
@@ -180,7 +179,7 @@ def _rules(rows: Sequence[Mapping[str, Any]]) -> tuple[Rule, ...]:
     return tuple(Rule(**{"measures": "", **{key: whole(value) for key, value in row.items()}}) for row in rows)
 
 
-_ROWS = tomllib.loads((resources.files("motionloom_train.data") / "windows.toml").read_text(encoding="utf-8"))
+_ROWS = read_table("motionloom_train.data", "windows.toml")
 ALONE, GESTURES, PATHS = (_rules(_ROWS[name]) for name in ("alone", "gestures", "paths"))
 """The first of the first is a window's only label; every choice of the second may give labels to one window; the first
 of the last names where a window without a gesture goes."""

@@ -1,11 +1,11 @@
 """Captions: mirrored, in everyday words, from index descriptions and from what a window measurably shows."""
 
 import re
-import tomllib
 from collections.abc import Callable, Sequence
-from importlib import resources
 
 import numpy as np
+
+from motionloom.reading import read_table
 
 _SWAPS = {
     "left": "right",
@@ -40,10 +40,14 @@ def mirror_text(text: str) -> str:
     return _SIDE.sub(swap, text)
 
 
-_WORDS = tomllib.loads((resources.files("motionloom_train.data") / "phrases.toml").read_text(encoding="utf-8"))
+_WORDS = read_table("motionloom_train.data", "phrases.toml")
 LABELS: dict[str, tuple[str, ...]] = {label: tuple(said) for label, said in _WORDS["labels"].items()}
 """Verb phrases for what a window measurably shows; see `data.windows`."""
 _PEOPLE: list[str] = _WORDS["people"]
+STATES, POSTURES = tuple(_WORDS["states"]), tuple(_WORDS["postures"])
+"""Labels that stay true however long a window is; actions that end in a posture which people keep."""
+EVENTS: dict[str, str] = _WORDS["events"]
+"""Labels of what happens at one moment, and patterns of how captions speak of it."""
 
 
 def sentence(verb_phrase: str, rng: np.random.Generator) -> str:

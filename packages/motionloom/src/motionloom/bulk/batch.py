@@ -99,7 +99,7 @@ def run(
             str(jobs.folder.resolve()),
             manifest["weights"]["sha256"],
             manifest["duets"],
-            _found(options),
+            _with_whole_paths(options),
             claimed.driver.name,
         )
         made = 0
@@ -231,7 +231,7 @@ def _is_done(head: Head, rows: list[bytes]) -> bool:
     return not head.names_files and head.counts.get("failed", 0) == head.refused and head.digest == digest(rows)
 
 
-def _found(options: Options) -> Options:
+def _with_whole_paths(options: Options) -> Options:
     """The options with whole paths: other processes may be elsewhere."""
 
     def whole(name: str | None) -> str | None:

@@ -59,7 +59,9 @@ class Driver:
     def here() -> "Driver":
         """This process."""
         start = time.strftime("%Y-%m-%d %H:%M:%S")
-        return Driver(secrets.token_hex(8), socket.gethostname(), _machine(), os.getpid(), _begun(os.getpid()), start)
+        return Driver(
+            secrets.token_hex(8), socket.gethostname(), _machine(), os.getpid(), _start_of(os.getpid()), start
+        )
 
     def __str__(self) -> str:
         return f"process {self.pid} on {self.host}, begun {self.start}"
@@ -201,7 +203,7 @@ def _read(data: bytes) -> Driver | None:
 def _is_gone(place: Path, driver: Driver | None) -> bool:
     """Whether a driver lives no more; of another machine's it takes until its file is touched, or has long not been."""
     if driver is not None and driver.begun and driver.machine == _machine():
-        return _begun(driver.pid) != driver.begun
+        return _start_of(driver.pid) != driver.begun
     first = None
     while True:
         found = _beats(place)
@@ -237,7 +239,7 @@ def _machine() -> str:
     return " ".join(known)
 
 
-def _begun(pid: int) -> str:
+def _start_of(pid: int) -> str:
     """When a process of this machine began, as text to be compared; empty where there is none."""
     with suppress(OSError, IndexError):
         state, *fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()

@@ -65,7 +65,7 @@ class Jobs:
             raise MotionloomError(
                 f"{path} is no file of jobs: its name must end in {', '.join(READS)}; plain prompts go with --prompts"
             )
-        return Jobs(_found(path))
+        return Jobs(_existing(path))
 
     @staticmethod
     def of_prompts(path: Path | str, *, variants: int = 1, seed: int = 0) -> "Jobs":
@@ -74,7 +74,7 @@ class Jobs:
             raise MotionloomError(f"variants must be 1 to 10,000,000; got {variants}")
         if Path(path).suffix.lower() in READS:
             raise MotionloomError(f"{path} is a file of jobs by its name; give it without --prompts")
-        return Jobs(_found(Path(path)), variants=variants, seed=seed)
+        return Jobs(_existing(Path(path)), variants=variants, seed=seed)
 
     @staticmethod
     def of_recordings(folder: Path | str) -> "Jobs":
@@ -159,7 +159,7 @@ def parquet() -> Any:
     return arrow("pyarrow.parquet")
 
 
-def _found(path: Path) -> Path:
+def _existing(path: Path) -> Path:
     if not path.is_file():
         raise MotionloomError(f"there is no file {path}; name a file of jobs")
     return path

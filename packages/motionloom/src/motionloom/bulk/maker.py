@@ -224,7 +224,7 @@ class Maker:
 
     def _try(self, rows: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
         try:
-            found: list[tuple[Asked, Made | str]] = list(zip(rows, self._made(rows), strict=True))
+            found: list[tuple[Asked, Made | str]] = list(zip(rows, self._make_all(rows), strict=True))
         except MotionloomError as error:
             found = [(rows[0], str(error))]
         except Exception as error:  # a row that breaks the program breaks itself alone
@@ -235,7 +235,7 @@ class Maker:
         for row in rows:
             yield from self._try([row])
 
-    def _made(self, rows: list[Asked]) -> list[Made]:
+    def _make_all(self, rows: list[Asked]) -> list[Made]:
         for one in rows:
             check_format(self.options.format, robot=one.robot is not None)
         first = rows[0]

@@ -11,49 +11,16 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.kinematics import physics
 from motionloom.motion import Motion
+from motionloom.reading import read_table
 
 Values = Mapping[str, float | bool | None]
 Judge = Callable[[str, np.ndarray, float], bool | None]
 """(prompt, positions (frames, 22, 3) metres, fps) to whether the motion does what the words say; None: nobody knows."""
 
-MEANING: dict[str, str] = {
-    "seconds": "length of the motion",
-    "skate": "share of frames in which a foot on the floor slides faster than 0.5 m/s",
-    "skate_speed": "cm/s at which toes slide that are on the floor, on average",
-    "penetration": "metres that the lowest joint is below the floor, on average",
-    "floating": "metres that the lowest joint is above the floor, on average",
-    "jerk": "m/s^3 of all joints, on average",
-    "peak_jerk": "m/s^3, the largest of any joint in any frame",
-    "travel": "metres walked along the path",
-    "speed": "m/s along the path, on average",
-    "turn": "degrees that the body turned, to the left is positive",
-    "error": "metres from the goal on average (rows with a goal)",
-    "worst": "metres from the goal at the most (rows with a goal)",
-    "keeps": "whether it keeps the numbers in its words (prompts with numbers that are read)",
-    "obeys": "whether it does what its prompt says (prompts that a physical check knows)",
-    "apart": "metres between the hips of two people, on average (rows of the task duet)",
-    "nearest": "metres between the nearest joints of two people, where they are nearest (rows of the task duet)",
-}
+_TABLE = read_table("motionloom.bulk", "measures.toml")
+MEANING: dict[str, str] = _TABLE["motion"]
 """What each measure is."""
-ROBOT: dict[str, str] = {
-    "slowed_seconds": "seconds that a robot's clip is longer than the motion, so that its joints keep their speeds",
-    "float_cm": "centimetres of a robot's planted soles above the ground (95th percentile)",
-    "slide_cm": "centimetres that a robot's planted soles move in a frame (95th percentile)",
-    "sunk_cm": "centimetres of a robot's soles in the ground, at the most",
-    "sole_roll": "radians by which a robot's planted soles stand on one side (95th percentile)",
-    "planted_share": "share of frames with a robot's foot on the ground",
-    "limits_broken": "angles of a robot that are out of range",
-    "at_limit_share": "share of frames with a robot's joint at its limit",
-    "largest_step": "radians that a robot's joint moves in a frame, at the most",
-    "root_step_cm": "centimetres that a robot's root moves in a frame, at the most",
-    "root_turn": "radians that a robot's root turns in a frame, at the most",
-    "top_speed": "rad/s of a robot's fastest joint",
-    "speed_share": "that in shares of the joint's own limit (robots whose model states speeds, and max_speed)",
-    "effector_cm": "centimetres of a robot's hands and feet from where they were to be (median)",
-    "outside_support_share": "share of frames in which a robot could not hold its pose",
-    "collision_frames": "frames in which a robot touches itself",
-    "faults": "figures of a robot's clip that are over the limits of docs/robots.md",
-}
+ROBOT: dict[str, str] = _TABLE["robot"]
 """Of rows with a robot, as `motionloom.robots.figures` has them."""
 SHARED = ("apart", "nearest")
 """Measures of two people together."""

@@ -110,7 +110,7 @@ def _start(address: str | None) -> Any:
         else:
             ray.init(address=address, **options)
     except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
-        raise MotionloomError(f"there is no Ray cluster at {address or 'this machine'} ({_said(error)})") from None
+        raise MotionloomError(f"there is no Ray cluster at {address or 'this machine'} ({_shortened(error)})") from None
     return ray
 
 
@@ -128,7 +128,7 @@ def _check_answers(address: str) -> None:
         raise MotionloomError(f"there is no Ray cluster at {address} ({error}); see 'ray status' there") from None
 
 
-def _said(error: Exception) -> str:
+def _shortened(error: Exception) -> str:
     """What an error of Ray's says, in one line: how it begins, and how it ends, which is where a cause is named."""
     words = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
     return words if len(words) <= 300 else f"{words[:100]} ... {words[-200:]}"
@@ -201,7 +201,7 @@ class _Crew:
         try:
             answer = self.ray.get(reference)
         except self.ray.exceptions.RayTaskError as error:
-            raise MotionloomError(f"a worker failed: {_said(error)}") from None
+            raise MotionloomError(f"a worker failed: {_shortened(error)}") from None
         except self.ray.exceptions.RayError as error:
             self._lost(task, error)
             return None
@@ -218,7 +218,7 @@ class _Crew:
         if task is None:
             self.stillborn += 1
             if self.stillborn > 10 + 2 * self.workers:
-                raise MotionloomError(f"the workers of the Ray cluster end before they begin ({_said(error)})")
+                raise MotionloomError(f"the workers of the Ray cluster end before they begin ({_shortened(error)})")
             return
         self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
         if too_many_deaths(self.deaths[task.shard], len(task.rows)):

@@ -243,7 +243,7 @@ class Sources:
         seed = self.seed if row.seed is None else row.seed
         if row.timeline is not None:
             timeline = self._read("timeline", row.timeline, lambda path: read_timeline(path, metre), metre)
-            start = None if timeline.start is None else self._kept("start", timeline.start, load)
+            start = None if timeline.start is None else self._cached("start", timeline.start, load)
             _check_timeline(row.task or "", timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
             frames, digest = timeline.frames, digest_timeline(timeline, start)
@@ -322,12 +322,12 @@ class Sources:
         if name.lower() == "smpl22":
             return None
         path = Path(name) if field is None else field.file(self.folder)
-        return self._kept("skeleton", path, _read_skeleton)
+        return self._cached("skeleton", path, _read_skeleton)
 
     def _read(self, column: str, name: str, read: Callable[[Path], Any], *more: Any) -> Any:
-        return self._kept(column, Field(name, column).file(self.folder), read, *more)
+        return self._cached(column, Field(name, column).file(self.folder), read, *more)
 
-    def _kept(self, column: str, path: Path, read: Callable[[Path], Any], *more: Any) -> Any:
+    def _cached(self, column: str, path: Path, read: Callable[[Path], Any], *more: Any) -> Any:
         about = path.stat()
         key = (column, str(path), about.st_size, about.st_mtime_ns, *more)
         return self._cache.get(key, lambda: read(path))

@@ -155,7 +155,7 @@ class _Shard:
 
     def make(self) -> Report:
         old, whole = self._old()
-        asked = dict(self._asked())
+        asked = dict(self._requests())
         kept, todo = {}, {}
         for number, one in asked.items():
             was = old.get(one.id)
@@ -181,7 +181,7 @@ class _Shard:
         known = (e for e in self.store.entries(shard) if e["state"] in ("made", "dropped"))
         return {e["id"]: e for e in known if e["state"] == "dropped" or e["id"] not in lost}, not damaged
 
-    def _asked(self) -> Iterator[tuple[int, Asked]]:
+    def _requests(self) -> Iterator[tuple[int, Asked]]:
         """The rows that can be made; for the others an entry that says why not."""
         seen: dict[str, int] = {}
         for number, raw in enumerate(self.task.rows):
@@ -218,7 +218,7 @@ class _Shard:
             if carried:
                 file = self._writer(place)
                 file.carry(self.store.data(self.task.shard), set(carried))
-            for one, made in self._made(list(todo.values())):
+            for one, made in self._made_rows(list(todo.values())):
                 number = numbers[id(one)]
                 self.moved(1)
                 if self.careful:
@@ -246,7 +246,7 @@ class _Shard:
     def _writer(self, place: Path) -> Writer:
         return writer(self.batch.options.format, place, unit=self.batch.options.unit)
 
-    def _made(self, asked: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
+    def _made_rows(self, asked: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
         """What comes of each row; of careful work each row by itself, with whatever goes wrong as its error."""
         if not self.careful:
             yield from self.maker.make(asked)

@@ -44,16 +44,21 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     return top
 
 
+def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of the commands, by name."""
+    return next(dict(a.choices) for a in top._actions if isinstance(a, argparse._SubParsersAction))
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted (also by SIGTERM, SIGHUP)."""
     try:  # from here on: a Ctrl-C while the commands are still being imported is one too
         with interruptible(), escaping():
-            return _told(argv)
+            return _run_and_report(argv)
     except KeyboardInterrupt:  # while the end was being reported
         return 130
 
 
-def _told(argv: Sequence[str] | None) -> int:
+def _run_and_report(argv: Sequence[str] | None) -> int:
     """Run one command, and say in one line why it ended if it did not end well."""
     code = 2
     try:
@@ -84,8 +89,7 @@ def _run(argv: Sequence[str] | None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if argv is None else argv)
     top = parser(COMMANDS.get(words[0], words[0]) if words else None)
-    commands = next(a.choices for a in top._actions if isinstance(a, argparse._SubParsersAction))
-    arguments = top.parse_args(with_command(words, commands))
+    arguments = top.parse_args(with_command(words, commands_of(top)))
     if arguments.version:
         from importlib.metadata import version
 

@@ -9,19 +9,16 @@ from contextlib import ExitStack
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from motionloom.cli.options import add_options
-from motionloom.cli.reading import as_unit
-from motionloom.cli.sampling import add_adapters, fail
+from motionloom.bulk.batch import Where, array_task, check_jobs, check_options, processes, run
+from motionloom.bulk.estimate import estimate
+from motionloom.bulk.jobs import Jobs
+from motionloom.bulk.maker import Options
+from motionloom.bulk.measures import Filter
+from motionloom.bulk.shard import Report
 from motionloom.cli.terminal import escaping, unescaped
-from motionloom.requests.batch import Batch
-
-if TYPE_CHECKING:
-    from motionloom.bulk.batch import Where
-    from motionloom.bulk.jobs import Jobs
-    from motionloom.bulk.maker import Options
-    from motionloom.bulk.shard import Report
+from motionloom.cli.writing import fail
+from motionloom.runtime import set_threads
 
 JUDGE = "motionloom_lab.metrics.obedience:obeys"
 SHOWN = 10
@@ -32,71 +29,11 @@ SHORTEST = 3.0
 """Seconds over which a rate is measured at least: rows come several at a time."""
 
 
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register `batch`."""
-    parser = subparsers.add_parser(
-        "batch",
-        help="make many motions, on one machine or a cluster",
-        description="Make a motion of every row of JOBS (.jsonl, .csv, .parquet) into a folder of shards. The same "
-        "command goes on with what is missing. See docs/batch.md.",
-    )
-    parser.add_argument(
-        "jobs", nargs="?", type=Path, metavar="JOBS", help="a row per motion: prompt, seconds, seed ..."
-    )
-    parser.add_argument(
-        "--prompts", type=Path, metavar="FILE", help="a text file with a prompt per line, instead of JOBS"
-    )
-    parser.add_argument(
-        "--recordings",
-        type=Path,
-        metavar="FOLDER",
-        help="a folder of motion files instead of JOBS, which go onto the --robot or --skeleton as they are",
-    )
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="the folder of the batch")
-    parser.add_argument(
-        "--verify", type=Path, metavar="FOLDER", help="only say whether a batch's files are still as they were written"
-    )
-    parser.add_argument(
-        "--format",
-        default="npz",
-        choices=("npz", "csv", "bvh", "glb", "webdataset", "parquet"),
-        help="single files, or shards that hold many (default npz); joint angles of a robot: npz, csv, webdataset",
-    )
-    parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
-    parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
-    add_options(parser, Batch)
-    parser.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motions on this skeleton")
-    parser.add_argument(
-        "--out-unit", type=as_unit, default=1.0, metavar="UNIT", help="unit of --format bvh: m (default), cm, inch ..."
-    )
-    parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
-    parser.add_argument(
-        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
-    )
-    parser.add_argument(
-        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two people of one (default duet)"
-    )
-    add_adapters(parser)
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per core, or per GPU)")
-    parser.add_argument(
-        "--shard", metavar="I/N", help="make only every N-th shard from I on (default: as the Slurm array says)"
-    )
-    parser.add_argument(
-        "--ray", nargs="?", const="local", metavar="ADDRESS", help="run on a Ray cluster, or a local one"
-    )
-    parser.add_argument("--force", action="store_true", help="make the folder this job's, whatever job made it")
-    parser.add_argument("--dry-run", action="store_true", help="only say how many, how long and how large")
-    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
-    parser.set_defaults(run=run_batch)
-
-
 def run_batch(arguments: argparse.Namespace) -> int:
     """``motionloom batch JOBS --out FOLDER``; exit code 0 where every row was made or dropped, else 1.
 
     ``--verify FOLDER``: 2 where something is damaged.
     """
-    from motionloom.bulk.batch import check_jobs, check_options
 
     if arguments.verify is not None:
         return _verify(arguments)
@@ -105,7 +42,7 @@ def run_batch(arguments: argparse.Namespace) -> int:
     options, where, jobs = _options(arguments), _where(arguments), _jobs(arguments)
     check_options(options)
     robot = options.on_robot()
-    for note in () if robot is None else robot.robot.told():
+    for note in () if robot is None else robot.robot.remarks():
         print(f"note: {note}", file=sys.stderr)
     rows = jobs.count()
     check_jobs(jobs, rows)
@@ -139,8 +76,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _jobs(arguments: argparse.Namespace) -> "Jobs":
-    from motionloom.bulk.jobs import Jobs
+def _jobs(arguments: argparse.Namespace) -> Jobs:
 
     given = [one for one in (arguments.jobs, arguments.prompts, arguments.recordings) if one is not None]
     if len(given) != 1:
@@ -154,9 +90,7 @@ def _jobs(arguments: argparse.Namespace) -> "Jobs":
     return Jobs.of(arguments.jobs)
 
 
-def _options(arguments: argparse.Namespace) -> "Options":
-    from motionloom.bulk.maker import Options
-    from motionloom.bulk.measures import Filter
+def _options(arguments: argparse.Namespace) -> Options:
 
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     if obeys:
@@ -172,8 +106,7 @@ def _options(arguments: argparse.Namespace) -> "Options":
     )
 
 
-def _where(arguments: argparse.Namespace) -> "Where":
-    from motionloom.bulk.batch import Where, array_task
+def _where(arguments: argparse.Namespace) -> Where:
 
     if arguments.workers is not None and not 1 <= arguments.workers <= 10_000:
         fail(f"--workers must be 1 to 10000; got {arguments.workers}")
@@ -189,10 +122,7 @@ def _where(arguments: argparse.Namespace) -> "Where":
     return Where(arguments.workers, (int(first), int(count)))
 
 
-def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", where: "Where") -> None:
-    from motionloom.bulk.batch import processes
-    from motionloom.bulk.estimate import estimate
-    from motionloom.runtime import set_threads
+def _estimate(arguments: argparse.Namespace, jobs: Jobs, options: Options, where: Where) -> None:
 
     set_threads(1)
     found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
@@ -209,8 +139,7 @@ def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", w
         print(f"{found.usable:.0%} of the rows looked at would be kept")
 
 
-def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, where: "Where", rows: int) -> int:
-    from motionloom.bulk.batch import run
+def _make(arguments: argparse.Namespace, jobs: Jobs, options: Options, *, where: Where, rows: int) -> int:
 
     counts: Counter[str] = Counter()
     problems: list[str] = []
@@ -233,7 +162,7 @@ def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, wh
     return 1 if counts["failed"] else 0
 
 
-def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
+def _say(out: Path, counts: dict[str, int], made: int) -> None:
     said = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
     said += [f"{counts['dropped']:,} were dropped by the filter"] if counts["dropped"] else []
     said += (
@@ -281,7 +210,7 @@ class _Progress:
         self.made += rows
         self._show()
 
-    def done(self, report: "Report") -> None:
+    def done(self, report: Report) -> None:
         """A shard is whole; its rows that were not made now were there before."""
         self.there += report.rows - report.made
         self._show()

@@ -6,25 +6,15 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 
+from motionloom.cli.tables import add_family
+from motionloom.reading import read_table
+
 Commands = argparse._SubParsersAction
 Add = Callable[[Commands], None]
 
-FAMILIES = {
-    "generate": ("generate",),
-    "compose": ("compose",),
-    "live": ("live",),
-    "control": ("control",),
-    "edit": ("edit",),
-    "predict": ("predict", "switch"),
-    "duet": ("duet",),
-    "batch": ("batch",),
-    "serve": ("serve", "studio", "mcp"),
-    "files": ("export", "view", "info"),
-    "robots": ("robot-check",),
-    "weights": ("weights",),
-    "completion": ("completion",),
-}
-"""Modules beside this one, and the commands that each registers; one that is run imports no other."""
+_TABLE = read_table("motionloom.cli", "commands.toml")
+FAMILIES: dict[str, list[str]] = _TABLE["families"]
+"""Modules beside this one, each with a table of the commands that belong together."""
 GROUP = "motionloom.commands"
 """Entry points by which an installed package adds a command: its name, and the function that registers it."""
 
@@ -39,47 +29,27 @@ class Other:
     """The module that registers it."""
 
 
-OTHERS = {
-    "data": Other("turn recordings into a training set", "motionloom_train.cli.data"),
-    "teach": Other("teach the shipped weights an action or a style from a few clips", "motionloom_train.cli.teach"),
-    "train": Other("train a model from a recipe; continues an interrupted run", "motionloom_train.cli.train"),
-    "evaluate": Other(
-        "measure weights: obedience, realism, text metrics; compare runs",
-        "motionloom_lab.cli.evaluate",
-    ),
-    "bench": Other("measure speed and memory on this machine", "motionloom_lab.cli.bench"),
-    "import": Other(
-        "published weights to a file: an MDM, PriorMDM or HumanMAC network, or Guo's evaluator",
-        "motionloom_lab.cli.imports",
-    ),
-}
-BROUGHT_BY = {
-    "torch": "packages/motionloom-train",
-    "onnx": "packages/motionloom-train",
-    "motionloom_train": "packages/motionloom-train",
-    "matplotlib": "packages/motionloom-lab",
-    **dict.fromkeys(("mujoco", "mink", "qpsolvers", "daqp"), "motionloom[robots]"),
-    "motionloom_lab": "packages/motionloom-lab",
-}
+OTHERS = {name: Other(**row) for name, row in _TABLE["commands"].items()}
+BROUGHT_BY: dict[str, str] = _TABLE["packages"]
 """What this package does without, and what installs each."""
 
 
 def add_commands(commands: Commands, command: str | None) -> None:
     """Register no more than is needed to know ``command``; where nothing here knows it, all names there are.
 
-    None, or ``completion`` which lists options: all of all, with those of other packages where these are installed.
+    None: all options of all, with those of other packages where these are installed.
     Raises ModuleNotFoundError where ``command`` belongs to a package that is not.
     """
-    if command in OTHERS:
+    if command is not None and command in OTHERS:
         _registered(command)(commands)
         return
-    owner = next((family for family, names in FAMILIES.items() if command in names), None)
-    for family in FAMILIES if owner in (None, "completion") else [owner]:
-        import_module(f"motionloom.cli.{family}").add(commands)
-    if owner not in (None, "completion"):
+    families = [family for family, names in FAMILIES.items() if command in names] or FAMILIES
+    for family in families:
+        add_family(commands, f"motionloom.cli.{family}")
+    if command in commands.choices:
         return
     for name, other in OTHERS.items():
-        if command in (None, "completion") and find_spec(other.module.partition(".")[0]):
+        if command is None and find_spec(other.module.partition(".")[0]):
             _registered(name)(commands)
         else:
             commands.add_parser(name, help=other.help, add_help=False)

@@ -19,16 +19,11 @@ complete -o filenames -F _motionloom motionloom
 """
 
 
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register ``completion``."""
-    parser = subparsers.add_parser(
-        "completion",
-        help="print a script that completes commands in your shell",
-        description='Print a completion script: eval "$(motionloom completion bash)", likewise zsh; for fish: '
-        "motionloom completion fish | source",
-    )
-    parser.add_argument("shell", choices=("bash", "zsh", "fish"))
-    parser.set_defaults(run=lambda arguments: print(script(arguments.shell, subparsers.choices), end=""))
+def run_completion(arguments: argparse.Namespace) -> None:
+    """``motionloom completion SHELL``."""
+    from motionloom.cli import commands_of, parser
+
+    print(script(arguments.shell, commands_of(parser())), end="")
 
 
 def script(shell: str, commands: "dict[str, argparse.ArgumentParser]") -> str:

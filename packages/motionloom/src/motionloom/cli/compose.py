@@ -7,25 +7,26 @@ from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from motionloom.cli.looping import check_loop
-from motionloom.cli.options import PrintSchema, add_options
-from motionloom.cli.robots import metres_told
-from motionloom.cli.sampling import add_sampling, check_outs, fail, load_prior, remark_unknown, request_of, results
+from motionloom.cli.reading import load_motion
+from motionloom.cli.robots import note_on_metres
+from motionloom.cli.sampling import check_outs, fail, load_prior, remark_unknown, request_of, results
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
 from motionloom.errors import MotionloomError
+from motionloom.goals.timeline import Timeline
+from motionloom.interruption import held_back
+from motionloom.io.stream import Stream, check_length, open_stream, resampled
+from motionloom.kinematics.deeds import LONGEST
+from motionloom.motion import Motion
 from motionloom.requests.compose import Compose
 from motionloom.requests.reading import settled
-from motionloom.requests.shared import FINISH
-from motionloom.requests.timeline import SegmentKeys
-
-if TYPE_CHECKING:
-    from motionloom.goals.timeline import Timeline
-    from motionloom.io.stream import Stream
-    from motionloom.motion import Motion
-    from motionloom.weights.prior import Prior
+from motionloom.tasks.long import with_loaded
+from motionloom.tasks.run import Models, Plan
+from motionloom.tasks.splice import concatenated
+from motionloom.weights.prior import Prior
 
 REMARKED = 200
 """Segments whose texts are looked up among what the weights know."""
@@ -33,35 +34,16 @@ SHOWN = 40
 """Segments listed at the end; --json lists all."""
 
 
-def add(subparsers) -> None:
-    """Register `compose`."""
-    parser = subparsers.add_parser(
-        "compose",
-        help="make one long motion from several prompts",
-        description="One long motion from a timeline file, or from prompts that follow each other.",
-    )
-    parser.add_argument(
-        "segments", nargs="*", metavar="PROMPT|TIMELINE", help="what happens, one after the other; or one .yaml file"
-    )
-    add_options(parser, SegmentKeys, "seconds", "transition", helps={"seconds": "length of each segment, with prompts"})
-    parser.set_defaults(seconds=None)
-    add_options(parser, Compose, "seed", "guidance", "steps", "best_of", *FINISH)
-    add_sampling(parser)
-    parser.add_argument("--check", action="store_true", help="only say what would be made")
-    parser.add_argument("--schema", action=PrintSchema, kind="timeline")
-    parser.set_defaults(run=_compose)
-
-
-def _compose(arguments: argparse.Namespace) -> int:
+def run_compose(arguments: argparse.Namespace) -> int:
+    """``motionloom compose PROMPT PROMPT``."""
     outs, target = ([], None) if arguments.check else check_outs(arguments)
     metre = 1.0 if target is None else target.metre
     timeline = _timeline(arguments, metre)
     if metre != 1.0 and timeline.asks:
-        print(f"note: {metres_told(metre)}", file=sys.stderr)
+        print(f"note: {note_on_metres(metre)}", file=sys.stderr)
     if arguments.check:
         _report(arguments, timeline, seconds=timeline.seconds, streams=[])
         return 0
-    from motionloom.tasks.long import with_loaded
 
     check_loop(arguments, timeline.seconds)
     check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
@@ -74,12 +56,12 @@ def _compose(arguments: argparse.Namespace) -> int:
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
     _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks, happened=_happened(shown))
     if interrupted:
-        print(f"motionloom: interrupted; {_kept(streams)} of {timeline.seconds:.2f} s", file=sys.stderr)
+        print(f"motionloom: interrupted; {_finished_files(streams)} of {timeline.seconds:.2f} s", file=sys.stderr)
         return 130
     return 0
 
 
-def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
+def _timeline(arguments: argparse.Namespace, metre: float) -> Timeline:
     """What is asked, whether in a file or on the command line. metre: as of `Target.metre`."""
     from motionloom.goals import timeline
 
@@ -96,10 +78,9 @@ def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
 
 
 def _open(
-    arguments: argparse.Namespace, outs: Sequence[Path], timeline: "Timeline", target: Target | None
-) -> list["Stream"]:
+    arguments: argparse.Namespace, outs: Sequence[Path], timeline: Timeline, target: Target | None
+) -> list[Stream]:
     """The files, those that grow on the disk last: they are closed first, and that is quick."""
-    from motionloom.io.stream import check_length, open_stream
 
     rate, unit = arguments.fps or 20.0, arguments.out_unit or 1.0
     total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
@@ -112,29 +93,26 @@ def _open(
     return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
 
 
-def _happened(pieces: "Sequence[Motion]") -> list[Any]:
+def _happened(pieces: Sequence[Motion]) -> list[Any]:
     """What the person of these pieces did, if there are any."""
     from motionloom.kinematics.deeds import happened
-    from motionloom.tasks.splice import concatenated
 
     return happened([concatenated(*pieces)] if pieces else [])
 
 
 def _make(
     arguments: argparse.Namespace,
-    prior: "Prior",
-    timeline: "Timeline",
-    streams: Sequence["Stream"],
-    shown: "list[Motion]",
+    prior: Prior,
+    timeline: Timeline,
+    streams: Sequence[Stream],
+    shown: list[Motion],
 ) -> bool:
     """Write the motion; true if it was interrupted after something was finished.
 
     ``shown`` gets its pieces where what happened is told: of a motion that is not too long for that.
     """
-    from motionloom.kinematics.deeds import LONGEST
 
     told = arguments.json and timeline.seconds <= LONGEST
-    from motionloom.interruption import held_back
 
     try:
         with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is said
@@ -149,21 +127,19 @@ def _make(
     except MotionloomError as error:
         if not _saved(streams):
             raise
-        raise MotionloomError(f"{error} ({_kept(streams)})") from error
+        raise MotionloomError(f"{error} ({_finished_files(streams)})") from error
     if not _saved(streams):
         fail("no motion was made; this is a fault of the program")
     return False
 
 
-def _kept_in(shown: "list[Motion]", pieces: Iterable["Motion"]) -> Generator["Motion", None, None]:
+def _kept_in(shown: list[Motion], pieces: Iterable[Motion]) -> Generator[Motion, None, None]:
     for piece in pieces:
         yield piece
         shown.append(piece)
 
 
-def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float | None) -> None:
-    from motionloom.interruption import held_back
-    from motionloom.io.stream import resampled
+def _write(pieces: Iterable[Motion], streams: Sequence[Stream], fps: float | None) -> None:
 
     with ExitStack() as stack:
         for stream in streams:
@@ -174,9 +150,7 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
                     stream.write(piece)
 
 
-def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:
-    from motionloom.cli.reading import load_motion
-    from motionloom.tasks.run import Models, Plan
+def _pieces(arguments: argparse.Namespace, prior: Prior, timeline: Timeline) -> Generator[Motion, None, None]:
 
     values = request_of(arguments, Compose, {"timeline": timeline})
     plan = Plan(
@@ -191,20 +165,20 @@ def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline")
         yield from result.people
 
 
-def _saved(streams: Sequence["Stream"]) -> list["Stream"]:
+def _saved(streams: Sequence[Stream]) -> list[Stream]:
     return [stream for stream in streams if stream.saved]
 
 
-def _kept(streams: Sequence["Stream"]) -> str:
+def _finished_files(streams: Sequence[Stream]) -> str:
     return "what was finished is in " + ", ".join(f"{s.path}, {s.seconds:.2f} s" for s in _saved(streams))
 
 
 def _report(
     arguments: argparse.Namespace,
-    timeline: "Timeline",
+    timeline: Timeline,
     *,
     seconds: float,
-    streams: Sequence["Stream"],
+    streams: Sequence[Stream],
     remarks: Sequence[str] = (),
     happened: Sequence[Any] = (),
 ) -> None:

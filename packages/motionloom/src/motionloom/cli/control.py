@@ -2,16 +2,18 @@
 
 import argparse
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from motionloom.cli.finished import Finished, finished_motions
 from motionloom.cli.looping import check_loop, note_loop
 from motionloom.cli.newcomers import one_sentence
-from motionloom.cli.options import PrintSchema, add_options
+from motionloom.cli.reading import load_motion
+from motionloom.cli.robots import note_on_metres
 from motionloom.cli.sampling import (
-    add_sampling,
     check_outs,
     check_prompt,
     fail,
@@ -22,68 +24,22 @@ from motionloom.cli.sampling import (
     request_of,
     results,
 )
-from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
 from motionloom.errors import quoted
+from motionloom.goals.goal import FPS, Goal, merged
+from motionloom.goals.goal_file import follow, read_goal
+from motionloom.goals.reach import check_reach
+from motionloom.motion import Motion
 from motionloom.requests.control import Control
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from motionloom.goals.goal import Goal
-    from motionloom.motion import Motion
-    from motionloom.tasks.control import Adapters, Controlled
-    from motionloom.weights.prior import Prior
-
-
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register `control`."""
-    parser = subparsers.add_parser(
-        "control",
-        help="make motions from words that keep to a path, a hand, poses",
-        description="Make motions that do what PROMPT says and meet goals: see docs/control.md.",
-    )
-    parser.add_argument("prompt", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
-    parser.add_argument(
-        "--goal",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="a JSON file of paths, joints and poses, repeatable",
-    )
-    parser.add_argument(
-        "--follow",
-        action="append",
-        default=[],
-        metavar="JOINT",
-        help="joint or group that goes where that of --from goes, repeatable",
-    )
-    parser.add_argument("--from", dest="clip", type=Path, metavar="CLIP", help="the motion file that --follow follows")
-    parser.add_argument("--path", type=Path, metavar="SVG", help="a line to walk along, seen from above")
-    parser.add_argument(
-        "--width",
-        type=float,
-        metavar="METRES",
-        help="width of the drawing (default: as large as is walked in the time)",
-    )
-    add_options(parser, Control)
-    parser.add_argument(
-        "--adapters",
-        action="append",
-        default=[],
-        metavar="NAME|FILE",
-        help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
-    )
-    parser.add_argument("--schema", action=PrintSchema, kind="goal")
-    add_one_file(parser)
-    add_sampling(parser)
-    parser.set_defaults(run=run_control)
+from motionloom.tasks.control import Adapters, Controlled
+from motionloom.tasks.run import Models, Plan
+from motionloom.tasks.text import frames_in
+from motionloom.weights.adapter import Adapter
+from motionloom.weights.prior import Prior
 
 
 def run_control(arguments: argparse.Namespace) -> int:
     """``motionloom control PROMPT --goal FILE``."""
-    from motionloom.tasks.run import Models, Plan
 
     outs, target = check_outs(arguments)
     if len(one_sentence(arguments.prompt)) > 1:
@@ -96,10 +52,8 @@ def run_control(arguments: argparse.Namespace) -> int:
     metre = 1.0 if target is None else target.metre
     goal = _goal(arguments, metre)
     if metre != 1.0:
-        print(f"note: {_told(goal, metre)}", file=sys.stderr)
+        print(f"note: {_note_on_path(goal, metre)}", file=sys.stderr)
     if arguments.loop:
-        from motionloom.goals.goal import FPS
-
         check_loop(arguments, len(goal.positions) / FPS)
         note_loop(arguments, "goals there are not kept")
     check_overwriting(arguments, [file for several in files for file in several])
@@ -117,41 +71,32 @@ def run_control(arguments: argparse.Namespace) -> int:
         adapters=_adapters(arguments.adapters, prior),
     )
 
-    def drawn() -> "Iterator[list[Motion]]":
+    def drawn() -> Iterator[list[Motion]]:
         for one in results("controlling", plan, Models(prior)):
             judged.append(one.about)
             yield list(one.people)
 
-    interrupted = made.take(drawn(), told=arguments.json)
+    interrupted = made.take(drawn(), measured=arguments.json)
     written = [[file for file in several if file in made.written] for several in files]
     _report(arguments, judged[: made.count], written, made=made, metre=metre, remarks=remarks)
     return made.ended(interrupted)
 
 
-def _told(goal: "Goal", metre: float) -> str:
+def _note_on_path(goal: Goal, metre: float) -> str:
     """How a path in a robot's metres is walked by the person that is drawn."""
-    import numpy as np
-
-    from motionloom.cli.robots import metres_told
-    from motionloom.goals.goal import FPS
 
     asked = np.flatnonzero(goal.asked[:, 0, [0, 2]].all(axis=1))
     if len(asked) < 2:
-        return metres_told(metre)
+        return note_on_metres(metre)
     way = float(np.linalg.norm(np.diff(goal.positions[asked, 0][:, [0, 2]], axis=0), axis=1).sum())
     pace = way * FPS / (asked[-1] - asked[0])
     gone = f"it goes {metre * way:.2f} m at {metre * pace:.2f} m/s, as a person would at {pace:.2f} m/s"
     return f"goals are in the robot's metres: {gone}"
 
 
-def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
+def _goal(arguments: argparse.Namespace, metre: float) -> Goal:
     """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a clip that
     is followed is the person's anyway."""
-    from motionloom.cli.reading import load_motion
-    from motionloom.goals.goal import FPS, merged
-    from motionloom.goals.goal_file import follow, read_goal
-    from motionloom.goals.reach import check_reach
-    from motionloom.tasks.text import frames_in
 
     if bool(arguments.follow) != (arguments.clip is not None):
         fail("--follow names joints of the motion that --from names; give both or none")
@@ -164,7 +109,7 @@ def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
     frames = frames_in(usual if arguments.seconds is None else arguments.seconds, FPS)
     goals = [read_goal(file, frames=frames, folder=file.parent, metre=metre) for file in arguments.goal]
     if arguments.path is not None:
-        goals.append(_drawn(arguments.path, arguments.width, frames, metre))
+        goals.append(_goal_of_drawing(arguments.path, arguments.width, frames, metre))
     if clip is not None:
         goals.append(follow(clip, arguments.follow, frames=frames))
     whole = goals[0]
@@ -179,9 +124,8 @@ def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
     return whole
 
 
-def _drawn(path: Path, width: float | None, frames: int, metre: float) -> "Goal":
+def _goal_of_drawing(path: Path, width: float | None, frames: int, metre: float) -> Goal:
     """The line of an SVG file."""
-    from motionloom.goals.goal_file import read_goal
 
     if not path.is_file():
         fail(f"--path: there is no file {quoted(str(path))}")
@@ -190,7 +134,7 @@ def _drawn(path: Path, width: float | None, frames: int, metre: float) -> "Goal"
     return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent, metre=metre)
 
 
-def _adapters(names: list[str], prior: "Prior") -> "Adapters":
+def _adapters(names: list[str], prior: Prior) -> Adapters:
     """'none', 'fitting' or the adapters of these names."""
     if not names or names == ["none"]:
         return "none"
@@ -198,17 +142,16 @@ def _adapters(names: list[str], prior: "Prior") -> "Adapters":
         return "fitting"
     if {"fitting", "none"} & set(names):
         fail("--adapters is none, fitting, or names of adapters; not a mix of them")
-    from motionloom.weights.adapter import Adapter
 
     return [Adapter.load(name, prior) for name in names]
 
 
 def _report(
     arguments: argparse.Namespace,
-    judged: "list[Controlled]",
+    judged: list[Controlled],
     written: list[list[Path]],
     *,
-    made: "Finished[Motion]",
+    made: Finished[Motion],
     metre: float,
     remarks: list[str],
 ) -> None:

@@ -2,15 +2,14 @@
 
 import argparse
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from motionloom.cli.finished import Finished
-from motionloom.cli.options import add_options
-from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
-from motionloom.cli.robots import metres_told
+from motionloom.cli.reading import crop, note_rate, read_clip
+from motionloom.cli.robots import note_on_metres
 from motionloom.cli.sampling import (
-    add_sampling,
     check_prompt,
     fail,
     load_prior,
@@ -18,25 +17,29 @@ from motionloom.cli.sampling import (
     report,
     request_of,
     results,
-    take_text_anywhere,
 )
 from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.two_bodies import two_body_measures, two_body_remarks
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters, writable
+from motionloom.goals.goal import FPS, Goal
+from motionloom.goals.goal_file import read_goal
+from motionloom.goals.remarks import remarks_on_two
+from motionloom.goals.roles import prompts_of
+from motionloom.goals.timeline import Timeline, read_timeline
+from motionloom.io import save, save_scene
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.io.lined_yaml import fail as fail_at
+from motionloom.io.lined_yaml import read_lined
+from motionloom.io.stream import check_length
+from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.duet import Duet
-from motionloom.requests.shared import FINISH, SAMPLED
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from motionloom.goals.goal import Goal
-    from motionloom.goals.timeline import Timeline
-    from motionloom.motion import Motion
-    from motionloom.tasks.run import Plan
-    from motionloom.weights.pair import PairBlock
-    from motionloom.weights.prior import Prior
+from motionloom.requests.reading import settled
+from motionloom.tasks.run import Models, Plan
+from motionloom.tasks.text import frames_in
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 
 MAX_SECONDS = 3600.0
 """Of a timeline."""
@@ -48,51 +51,8 @@ REMARKED = 64
 """Segments of a timeline whose words are remarked on."""
 
 
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register `duet`."""
-    parser = subparsers.add_parser(
-        "duet",
-        help="make motions of two people together",
-        description="Two people in one world: from words, behind both their motions, or around one's: docs/duet.md.",
-    )
-    parser.add_argument(
-        "text", nargs="?", metavar="TEXT", help="what the two do; 'what the first does :: what the second does'"
-    )
-    parser.add_argument("--past", nargs=2, type=Path, metavar=("A", "B"), help="motion files of both to go on from")
-    parser.add_argument(
-        "--react-to", type=Path, metavar="FILE", help="motion file of the first; only the second is generated"
-    )
-    parser.add_argument("--timeline", type=Path, metavar="YAML", help="several texts, one after the other")
-    parser.add_argument(
-        "--path",
-        type=Path,
-        action="append",
-        metavar="FILE",
-        help="goal file (.json, .yaml) or drawing (.svg) for one; given twice, one for each",
-    )
-    parser.add_argument(
-        "--person", type=int, choices=(1, 2), default=1, help="whose the path and a timeline's goals are (default 1)"
-    )
-    add_options(parser, Duet, "seconds", *SAMPLED, "pair_guidance", "bodies", *FINISH)
-    parser.add_argument(
-        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
-    )
-    given = "those of the motions given"
-    add_sampling(
-        parser,
-        own_rate=f"20, or {given}",
-        own_skeleton=f"the uniform person's, or {given}",
-        own_unit=f"m, or {given}",
-        out="both people in a .glb .mp4 .gif .png, or two .bvh or .npz, one for each (default duet.glb)",
-    )
-    add_reading(parser)
-    take_text_anywhere(parser)
-    parser.set_defaults(run=run_duet)
-
-
 def run_duet(arguments: argparse.Namespace) -> int:
     """``motionloom duet``."""
-    from motionloom.tasks.run import Models
 
     _check(arguments)
     outs, skin = check_pair_outs(arguments)
@@ -102,17 +62,17 @@ def run_duet(arguments: argparse.Namespace) -> int:
     timeline = _timeline(arguments, metre) if arguments.timeline else None
     goals = _goals(arguments, metre)
     if metre != 1.0 and (any(goals) or (timeline is not None and timeline.asks)):
-        print(f"note: {metres_told(metre)}", file=sys.stderr)
+        print(f"note: {note_on_metres(metre)}", file=sys.stderr)
     given, manners = _read(arguments)
     _check_sizes(arguments, files, given, timeline)
     prior, block = _load(arguments)
     remarks = _remarks_on_words(prior, block, _texts(arguments, timeline))
     caption = _caption(arguments, timeline)
 
-    def write(duets: "Sequence[list[Motion]]", places: list[list[Path]], first: int) -> None:
+    def write(duets: Sequence[list[Motion]], places: list[list[Path]], first: int) -> None:
         write_pairs(duets, places, manners, caption, skin)
 
-    def put(duets: "Sequence[list[Motion]]") -> "list[list[Motion]]":
+    def put(duets: Sequence[list[Motion]]) -> list[list[Motion]]:
         rated = [at_rate(duet, arguments.fps) for duet in duets]
         return rated if skin is None else [skin.put_together(duet) for duet in rated]
 
@@ -120,7 +80,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
     seconds = 0.0
     measures: list[dict[str, float]] = []
 
-    def drawn() -> "Iterator[list[list[Motion]]]":
+    def drawn() -> Iterator[list[list[Motion]]]:
         nonlocal seconds
         plan = _plan(arguments, given, timeline, goals)
         for one in results("drawing two people", plan, Models(prior, block)):
@@ -128,7 +88,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
             measures.append(two_body_measures(one.people))
             yield [list(one.people)]
 
-    interrupted = made.take(drawn(), told=arguments.json)
+    interrupted = made.take(drawn(), measured=arguments.json)
     about = _about(arguments, made.count, seconds)
     about |= {
         "measures": measures[: made.count],
@@ -142,13 +102,11 @@ def run_duet(arguments: argparse.Namespace) -> int:
 
 def _plan(
     arguments: argparse.Namespace,
-    given: "list[Motion]",
-    timeline: "Timeline | None",
-    goals: "tuple[Goal | None, Goal | None]",
-) -> "Plan":
+    given: list[Motion],
+    timeline: Timeline | None,
+    goals: tuple[Goal | None, Goal | None],
+) -> Plan:
     """What is asked, with what was read."""
-    from motionloom.requests.reading import settled
-    from motionloom.tasks.run import Plan
 
     values = request_of(arguments, Duet, {"prompt": arguments.text, "person": arguments.person - 1})
     usual = ADDED if arguments.past else SECONDS
@@ -166,8 +124,7 @@ def _plan(
 # What is read
 
 
-def _load(arguments: argparse.Namespace) -> "tuple[Prior, PairBlock]":
-    from motionloom.weights.pair import PairBlock
+def _load(arguments: argparse.Namespace) -> tuple[Prior, PairBlock]:
 
     prior = load_prior(arguments)
     return prior, PairBlock.load(arguments.pair_weights, prior)
@@ -177,7 +134,7 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
     return list(arguments.past or ([arguments.react_to] if arguments.react_to else []))
 
 
-def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[float, dict[str, str]]]]":
+def _read(arguments: argparse.Namespace) -> tuple[list[Motion], list[tuple[float, dict[str, str]]]]:
     """Motions that are given, and how their own files say numbers."""
     paths = _inputs(arguments)
     if len({path.resolve() for path in paths}) < len(paths):
@@ -194,11 +151,7 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
     return motions, manners
 
 
-def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
-    from motionloom.goals.roles import prompts_of
-    from motionloom.goals.timeline import read_timeline
-    from motionloom.io.lined_yaml import fail as fail_at
-    from motionloom.io.lined_yaml import read_lined
+def _timeline(arguments: argparse.Namespace, metre: float) -> Timeline:
 
     path = arguments.timeline
     timeline = read_timeline(path, metre)
@@ -219,7 +172,7 @@ def _timeline(arguments: argparse.Namespace, metre: float) -> "Timeline":
     return timeline
 
 
-def _goals(arguments: argparse.Namespace, metre: float) -> "tuple[Goal | None, Goal | None]":
+def _goals(arguments: argparse.Namespace, metre: float) -> tuple[Goal | None, Goal | None]:
     """What the first and what the second is asked."""
     asked = [_goal(arguments, path, metre) for path in arguments.path or ()]
     if len(asked) == 2:
@@ -228,12 +181,8 @@ def _goals(arguments: argparse.Namespace, metre: float) -> "tuple[Goal | None, G
     return (goal, None) if arguments.person == 1 else (None, goal)
 
 
-def _goal(arguments: argparse.Namespace, path: Path, metre: float) -> "Goal":
+def _goal(arguments: argparse.Namespace, path: Path, metre: float) -> Goal:
     """What somebody is asked: a goal file, such a mapping in YAML, or a drawn line."""
-    from motionloom.goals.goal import FPS
-    from motionloom.goals.goal_file import read_goal
-    from motionloom.io.lined_yaml import read_lined
-    from motionloom.tasks.text import frames_in
 
     frames = frames_in(SECONDS if arguments.seconds is None else arguments.seconds, FPS)
     if path.suffix.lower() in (".yaml", ".yml"):
@@ -301,11 +250,9 @@ def _single(skin: Target | None) -> tuple[str, ...]:
 
 
 def _check_sizes(
-    arguments: argparse.Namespace, files: list[list[Path]], given: "list[Motion]", timeline: "Timeline | None"
+    arguments: argparse.Namespace, files: list[list[Path]], given: list[Motion], timeline: Timeline | None
 ) -> None:
     """Refuse what no file or memory holds, before any work."""
-    from motionloom.io.stream import check_length
-    from motionloom.motion import MAX_POSES
 
     if timeline is None and not given:
         return
@@ -322,18 +269,17 @@ def _check_sizes(
 # What is written and reported
 
 
-def _texts(arguments: argparse.Namespace, timeline: "Timeline | None") -> list[str]:
+def _texts(arguments: argparse.Namespace, timeline: Timeline | None) -> list[str]:
     """What the two are asked in words."""
     said = [arguments.text or ""] if timeline is None else [segment.text for segment in timeline.segments[:REMARKED]]
     return [text for text in dict.fromkeys(said) if text.strip()]
 
 
-def _remarks_on_words(prior: "Prior", block: "PairBlock", texts: list[str]) -> list[str]:
+def _remarks_on_words(prior: Prior, block: PairBlock, texts: list[str]) -> list[str]:
     """Say how the words were read, and which of them neither the prior nor the block has learned; and give the lines.
 
     Of a block whose file has no table of what it knows nothing is said.
     """
-    from motionloom.goals.remarks import remarks_on_two
 
     return _printed([one.line for one in remarks_on_two(texts, block.known, prior.known, prior.text)])
 
@@ -344,22 +290,20 @@ def _printed(lines: list[str]) -> list[str]:
     return lines
 
 
-def _caption(arguments: argparse.Namespace, timeline: "Timeline | None") -> str:
+def _caption(arguments: argparse.Namespace, timeline: Timeline | None) -> str:
     if timeline is not None:
         return "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
     return arguments.text or " and ".join(path.stem for path in _inputs(arguments))
 
 
 def write_pairs(
-    duets: "Sequence[list[Motion]]",
+    duets: Sequence[list[Motion]],
     files: list[list[Path]],
-    manners: "list[tuple[float, dict[str, str]]]",
+    manners: list[tuple[float, dict[str, str]]],
     caption: str,
     skin: Target | None,
 ) -> list[Path]:
     """All files, duet by duet; a person whose motion came from a BVH file keeps its unit and orders."""
-    from motionloom.io import save, save_scene
-    from motionloom.io.bvh_writer import save_bvh
 
     written = []
     for number, duet in enumerate(duets):

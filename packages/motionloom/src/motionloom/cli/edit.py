@@ -1,14 +1,12 @@
 """`motionloom edit`: a clip changed by words."""
 
 import argparse
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from motionloom.cli.finished import Finished
-from motionloom.cli.options import add_options
-from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
+from motionloom.cli.reading import check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
-    add_sampling,
     check_outs,
     check_prompt,
     load_prior,
@@ -17,46 +15,19 @@ from motionloom.cli.sampling import (
     report,
     request_of,
     results,
-    take_text_anywhere,
     write,
 )
-from motionloom.cli.skeletons import Target, add_one_file, put_all
+from motionloom.cli.skeletons import Target, put_all
 from motionloom.cli.writing import at_rate, check_overwriting
-from motionloom.formats import readable
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
-from motionloom.requests.shared import FINISH, SAMPLED
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from motionloom.motion import Motion
-
-
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register `edit`."""
-    parser = subparsers.add_parser(
-        "edit",
-        help="change parts of a motion file by words",
-        description=f"Generate parts of a clip ({', '.join(readable())}) again; the rest does not change.",
-    )
-    parser.add_argument("clip", type=Path, metavar="CLIP")
-    parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")
-    add_options(parser, Edit, "keep", "between", "extend", "strength", "look", "smooth", *SAMPLED, *FINISH)
-    parser.add_argument(
-        "--source", type=Path, metavar="CLIP", help="a clip that the parts that do not stay follow, instead of words"
-    )
-    add_one_file(parser)
-    add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's", own_unit="the clip's")
-    add_reading(parser)
-    take_text_anywhere(parser)
-    parser.set_defaults(run=run_edit)
+from motionloom.retarget import to_smpl22
+from motionloom.tasks.run import Models, Plan
 
 
 def run_edit(arguments: argparse.Namespace) -> int:
     """``motionloom edit CLIP TEXT``."""
-
-    from motionloom.retarget import to_smpl22
-    from motionloom.tasks.run import Models, Plan
 
     uniform = arguments.skeleton in ("smpl", "smpl22")  # made so, rather than put on it afterwards
     arguments.skeleton = None if uniform or arguments.skeleton == "own" else arguments.skeleton
@@ -85,7 +56,7 @@ def run_edit(arguments: argparse.Namespace) -> int:
     people = (to_smpl22(clip) if uniform else clip,)
     plan = Plan(task="edit", values=values, sampling=values.sampling, people=people, target=source)
     versions = results("editing", plan, Models(prior))
-    interrupted = made.take((list(one.people) for one in versions), told=arguments.json)
+    interrupted = made.take((list(one.people) for one in versions), measured=arguments.json)
     about = {
         "clip": str(arguments.clip),
         "prompt": arguments.text,
@@ -101,11 +72,10 @@ def run_edit(arguments: argparse.Namespace) -> int:
 
 def _writer(
     captions: list[str], target: Target | None, unit: float | None, orders: dict[str, str]
-) -> "Callable[[Sequence[Motion], list[list[Path]], int], None]":
+) -> Callable[[Sequence[Motion], list[list[Path]], int], None]:
     """What writes versions; BVH files in the unit and the orders of rotations of the clip's own file."""
 
-    def written(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
-        from motionloom.io.bvh_writer import save_bvh
+    def written(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
 
         for several in places:
             if several[0].suffix.lower() != ".bvh" or target is not None:

@@ -5,86 +5,31 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from motionloom.cli.options import add_options
+from motionloom import io
 from motionloom.cli.reading import (
     RATE_ASSUMED,
-    add_reading,
     check_size,
     crop,
     note_rate,
     rate_assumed,
     read_clip,
 )
-from motionloom.cli.skeletons import Target, add_skeleton, read_target
-from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
+from motionloom.cli.robots import check_inputs
+from motionloom.cli.skeletons import Target, read_target
+from motionloom.cli.writing import at_rate, check_overwriting, check_rate
 from motionloom.errors import MotionloomError
-from motionloom.formats import readable, writable
-from motionloom.requests.export import Stretch
-
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
-
-
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register ``export``, ``view`` and ``info``."""
-    export = subparsers.add_parser(
-        "export",
-        help="turn a motion file into another format",
-        description=f"Turn a motion ({', '.join(readable())}; .amc with its .asf) into "
-        f"{', '.join(writable())}; the name of OUT picks the format.",
-    )
-    export.add_argument(
-        "inputs",
-        metavar="IN",
-        type=Path,
-        nargs="+",
-        help="the motion, and OUT behind it; several become animations of one --skeleton character",
-    )
-    export.add_argument("--out", type=Path, metavar="NAME", help="the file to write, instead of OUT")
-    add_reading(export)
-    add_options(export, Stretch, "fps", "mirror")
-    add_skeleton(export, own="IN's")
-    export.add_argument("--source-map", "--joint-map", type=Path, metavar="JSON", help="which joints are which, of IN")
-    export.add_argument(
-        "--check", action="store_true", help="only print how good the clip of a --robot is, as JSON (robot-check)"
-    )
-    add_writing(export, unit="as read, else m")
-    export.add_argument("--order", metavar="XYZ", help="order of rotations of a BVH written (as read, else ZXY)")
-    export.set_defaults(run=run_export)
-
-    view = subparsers.add_parser(
-        "view",
-        help="draw a motion file, or make a page that plays it",
-        description="Draw motions as a contact sheet (.png) or a film (.mp4, .gif), or make one page of HTML (.html) "
-        "that plays them in any browser, without a network.",
-    )
-    view.add_argument("inputs", metavar="FILE", type=Path, nargs="+")
-    add_reading(view)
-    view.add_argument("--out", metavar="PICTURE", type=Path, help="(default: FILE's name with .png, in this folder)")
-    view.add_argument("--fps", type=float, metavar="N", help="frame rate of a film or a page (default: as read)")
-    view.add_argument(
-        "--skeleton", metavar="FILE", help="a .glb or .vrm character, which becomes part of an .html and plays in it"
-    )
-    add_force(view)
-    view.set_defaults(run=run_view)
-
-    info = subparsers.add_parser(
-        "info",
-        help="print what a motion file contains and what happens in it",
-        description="Say what a motion file holds, what happens in it and what looks wrong.",
-    )
-    info.add_argument("input", metavar="FILE", type=Path)
-    add_reading(info)
-    info.add_argument("--json", action="store_true", help="print JSON, with all joint names")
-    info.set_defaults(run=run_info)
+from motionloom.formats import find
+from motionloom.io import GLTF
+from motionloom.io.bvh import save_bvh, unit_that_reads_back
+from motionloom.io.gltf_read import open_glb
+from motionloom.io.info import describe
+from motionloom.kinematics.deeds import measure_deeds
+from motionloom.motion import Motion
 
 
 def run_export(arguments: argparse.Namespace) -> int:
     """``motionloom export IN OUT``."""
-    from motionloom import io
-    from motionloom.cli.robots import check_inputs
 
     if arguments.check:
         return check_inputs(arguments)
@@ -101,7 +46,7 @@ def run_export(arguments: argparse.Namespace) -> int:
     if arguments.source_map and not skin:
         raise MotionloomError("--source-map says which joints are which for a --skeleton; name one")
     _write(arguments, target, skin, read)
-    held = (skin and skin.told()) or "; ".join(_summary(motion) for motion, _, _ in read)
+    held = (skin and skin.summary()) or "; ".join(_summary(motion) for motion, _, _ in read)
     print(f"wrote {target}: {held}")
     note_rate(arguments, arguments.inputs)
     return 0
@@ -111,10 +56,9 @@ def _write(
     arguments: argparse.Namespace,
     target: Path,
     skin: Target | None,
-    read: "list[tuple[Motion, float | None, dict[str, str]]]",
+    read: list[tuple[Motion, float | None, dict[str, str]]],
 ) -> None:
     """Write what was read; several motions into a character's own file."""
-    from motionloom import io
 
     names = None if skin is None else skin.names([path.stem for path in arguments.inputs])
     motions = [motion for motion, _, _ in read]
@@ -123,8 +67,6 @@ def _write(
         _only_bvh(arguments, target)
         skin.save_clips(motions, target, names)
     elif target.suffix.lower() == ".bvh":
-        from motionloom.io.bvh import save_bvh, unit_that_reads_back
-
         motion = motion if skin is None else skin.shown(motion, target)
         chosen = arguments.out_unit or unit_that_reads_back(motion, unit or 1.0)
         if unit_that_reads_back(motion, chosen) != chosen:
@@ -137,7 +79,7 @@ def _write(
 
 def _exported(
     arguments: argparse.Namespace, path: Path, skin: Target | None
-) -> "tuple[Motion, float | None, dict[str, str]]":
+) -> tuple[Motion, float | None, dict[str, str]]:
     """A motion as it is to be written, and the unit and the orders of rotations of a BVH."""
     motion, unit, orders = read_clip(arguments, path)
     if skin is None:
@@ -153,7 +95,6 @@ def _exported(
 
 def run_view(arguments: argparse.Namespace) -> None:
     """``motionloom view FILE ...``."""
-    from motionloom import io
 
     target = arguments.out or Path(f"{arguments.inputs[0].stem}.png")
     if target.suffix.lower() not in (".png", ".mp4", ".gif", ".html"):
@@ -174,7 +115,6 @@ def run_view(arguments: argparse.Namespace) -> None:
 
 def _write_page(arguments: argparse.Namespace, target: Path) -> None:
     """A take for each file, with everybody in it, on the character that the line names."""
-    from motionloom import io
     from motionloom.viz.page import MAX_BYTES, Take, write_page
 
     character, put = None, None
@@ -197,10 +137,8 @@ def _write_page(arguments: argparse.Namespace, target: Path) -> None:
         )
 
 
-def _people(arguments: argparse.Namespace, path: Path) -> "list[Motion]":
+def _people(arguments: argparse.Namespace, path: Path) -> list[Motion]:
     """Everybody in a file, or the one motion that the line picks of it."""
-    from motionloom import io
-    from motionloom.formats import find
 
     if find(path).people and arguments.animation is None and arguments.unit is None:
         return io.load_scene(path)
@@ -209,8 +147,6 @@ def _people(arguments: argparse.Namespace, path: Path) -> "list[Motion]":
 
 def run_info(arguments: argparse.Namespace) -> None:
     """``motionloom info FILE``."""
-    from motionloom.io.info import describe
-    from motionloom.kinematics.deeds import measure_deeds
 
     motion, unit, _ = read_clip(arguments, arguments.input)
     clips = _clips(arguments.input)
@@ -242,13 +178,11 @@ def run_info(arguments: argparse.Namespace) -> None:
 
 def _clips(path: Path) -> list[tuple[str, float]]:
     """Name and seconds of each animation of a glTF file."""
-    from motionloom.io import GLTF
-    from motionloom.io.gltf_read import open_glb
 
     return open_glb(path).lengths if path.suffix.lower() in GLTF else []
 
 
-def _summary(motion: "Motion") -> str:
+def _summary(motion: Motion) -> str:
     frames = "1 frame" if len(motion) == 1 else f"{len(motion)} frames"
     return f"{frames}, {motion.seconds:.2f} s at {motion.fps:g} frames per second, {len(motion.skeleton)} joints"
 

@@ -5,15 +5,13 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from motionloom.cli.sampling import write
 from motionloom.cli.skeletons import Target, put_all
 from motionloom.cli.writing import at_rate
 from motionloom.interruption import held_back
-
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
+from motionloom.motion import Motion
 
 Made = TypeVar("Made")
 """What is made ``--count`` times: a motion, or the motions of two people."""
@@ -48,10 +46,10 @@ class Finished(Generic[Made]):
         """Files that are in their places, by ``--out``."""
         return [file for several in self.files for file in several if file in self._files]
 
-    def take(self, makers: Iterable[Sequence[Made]], *, told: bool = False) -> bool:
+    def take(self, makers: Iterable[Sequence[Made]], *, measured: bool = False) -> bool:
         """Write what ``makers`` give, in order, as it comes; true if that was interrupted after some was finished.
 
-        told: measure what happened.
+        measured: measure what happened.
         """
         from motionloom.kinematics.deeds import happened
 
@@ -61,7 +59,7 @@ class Finished(Generic[Made]):
                 self.sampling += time.perf_counter() - began
                 self._add(some)
                 people: list[Any] = [one if isinstance(one, list) else [one] for one in some]
-                self.happened += map(happened, people) if told else ()
+                self.happened += map(happened, people) if measured else ()
                 began = time.perf_counter()
         except KeyboardInterrupt:
             if not self.count:
@@ -108,7 +106,7 @@ def finished_motions(
     *,
     unit: float | None = None,
     rate: float | None = None,
-) -> "Finished[Motion]":
+) -> Finished[Motion]:
     """Motions of these captions that are to be finished, put on the target's skeleton, and written to these files.
 
     unit: metres that a unit of a BVH is, without a target; rate: frames per second, None: as they are made.
@@ -116,7 +114,7 @@ def finished_motions(
 
     captions = captions if target is None else target.names(captions)
 
-    def written(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
+    def written(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
         for several in places:
             write(motions, several, captions[first : first + len(motions)], target, unit=unit)
 

@@ -4,19 +4,19 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from motionloom.cli.sampling import fail, numbered
 from motionloom.cli.skeletons import Target as Skin
 from motionloom.cli.skeletons import open_target, put_all
 from motionloom.errors import MotionloomError
+from motionloom.formats import writable
 from motionloom.interruption import held_back
+from motionloom.io import check_output, check_program, save
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.io.folder import atomic_folder, check_folder
+from motionloom.io.stream import Stream, joined, open_stream
+from motionloom.motion import Motion
 
-if TYPE_CHECKING:
-    from motionloom.io.stream import Stream
-    from motionloom.motion import Motion
-
-FORMATS = ("bvh", "glb", "vrma", "usda", "fbx", "npz", "csv", "mp4", "gif", "png")
 OVERLAYS = (".png", ".mp4", ".gif")
 SHOWN = 50
 """Futures that pictures show, the first ones."""
@@ -53,7 +53,6 @@ def targets(
     outs: Sequence[Path], count: int, formats: Sequence[str], *, pictures: bool, own: str | None = None
 ) -> list[Target]:
     """The files to write; refuses places that cannot be, before any work; ``own`` is a character's own suffix."""
-    from motionloom.io import check_output
 
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each its own name")
@@ -64,9 +63,6 @@ def targets(
 
 
 def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Target:
-    from motionloom.formats import writable
-    from motionloom.io import check_output, check_program
-    from motionloom.io.folder import check_folder
 
     suffix = out.suffix.lower()
     if suffix in (*writable(), own) and not out.is_dir():
@@ -89,7 +85,6 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
 
 def _film() -> str:
     """Name of a folder's film: a .gif where there is no ffmpeg for an .mp4."""
-    from motionloom.io import check_program
 
     try:
         check_program("overlay.mp4")
@@ -99,15 +94,12 @@ def _film() -> str:
 
 
 def write_futures(
-    wanted: Sequence[Target], motions: "Sequence[Motion]", past: int, writing: Writing, *, caption: str
+    wanted: Sequence[Target], motions: Sequence[Motion], past: int, writing: Writing, *, caption: str
 ) -> list[Path]:
     """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does.
 
     There may be fewer than names in ``wanted``: then the first of those are written. Gives the files that were.
     """
-    from motionloom.io import save
-    from motionloom.io.bvh_writer import save_bvh
-    from motionloom.io.folder import atomic_folder
 
     motions = put_all(writing.skeleton, motions)
     with ExitStack() as stack:
@@ -130,7 +122,7 @@ def write_futures(
     ]
 
 
-def draw_overlays(motions: "Sequence[Motion]", past: int, files: Sequence[Path], *, caption: str) -> None:
+def draw_overlays(motions: Sequence[Motion], past: int, files: Sequence[Path], *, caption: str) -> None:
     """Pictures and films of the first futures over each other; the motions begin with ``past`` common frames."""
     if not files:
         return
@@ -159,12 +151,11 @@ class Long:
     finished: list[tuple[Path, float]] = field(default_factory=list)
     """Files that are whole or, after an interruption, valid, and their seconds (0 of pictures)."""
 
-    def write(self, makers: "Iterable[Iterable[Motion]]") -> bool:
+    def write(self, makers: Iterable[Iterable[Motion]]) -> bool:
         """One future after the other, each in pieces; true if that was interrupted after something was finished.
 
         A failure in between leaves what was finished too, and its message says so.
         """
-        from motionloom.io.folder import atomic_folder
 
         problem: BaseException | None = None
         with ExitStack() as stack:
@@ -177,14 +168,14 @@ class Long:
                     raise
                 problem = error
         if isinstance(problem, MotionloomError):
-            raise MotionloomError(f"{problem} (what was finished is in {self.kept()})") from problem
+            raise MotionloomError(f"{problem} (what was finished is in {self.finished_files()})") from problem
         return problem is not None
 
-    def kept(self) -> str:
+    def finished_files(self) -> str:
         """What was finished, in words."""
         return ", ".join(f"{path}, {seconds:.2f} s" for path, seconds in self.finished if seconds)
 
-    def _one(self, number: int, pieces: "Iterable[Motion]", folders: Sequence[Path]) -> "Motion | None":
+    def _one(self, number: int, pieces: Iterable[Motion], folders: Sequence[Path]) -> Motion | None:
         """Write one future to the end; gives what pictures show of it."""
         streams: list[tuple[Path, Stream]] = []
         shown: list[Motion] = []
@@ -210,9 +201,8 @@ class Long:
             self.finished += [(place, stream.seconds) for place, stream in streams if stream.saved]
         return _joined(shown)
 
-    def _open(self, number: int, piece: "Motion", folders: Sequence[Path]) -> "list[tuple[Path, Stream]]":
+    def _open(self, number: int, piece: Motion, folders: Sequence[Path]) -> list[tuple[Path, Stream]]:
         """The files of one future, and where they will be; those that grow on the disk last: they close first."""
-        from motionloom.io.stream import open_stream
 
         found = []
         for target, folder in zip(self.wanted, folders, strict=True):
@@ -235,13 +225,13 @@ class Long:
                 found.append((target.folder / names[number], stream))
         return sorted(found, key=lambda pair: pair[0].suffix.lower() == ".bvh")
 
-    def _shown(self, piece: "Motion", at: int) -> "list[Motion]":
+    def _shown(self, piece: Motion, at: int) -> list[Motion]:
         """What pictures show of a piece whose first frame is number ``at``."""
         first = max(self.past - round(BEFORE * piece.fps) - at, 0)
         behind = min(self.past + round(BEHIND * piece.fps) - at, len(piece))
         return [piece.frames(first, behind)] if first < behind else []
 
-    def _draw(self, heads: "Sequence[Motion | None]", folders: Sequence[Path]) -> None:
+    def _draw(self, heads: Sequence[Motion | None], folders: Sequence[Path]) -> None:
         motions = [head for head in heads if head is not None]
         for target, folder in zip(self.wanted, folders, strict=True):
             if not motions:
@@ -251,7 +241,6 @@ class Long:
             self.finished += [(target.folder / name, 0.0) for name in target.overlays]
 
 
-def _joined(pieces: "Sequence[Motion]") -> "Motion | None":
-    from motionloom.io.stream import joined
+def _joined(pieces: Sequence[Motion]) -> Motion | None:
 
     return joined(pieces) if pieces else None

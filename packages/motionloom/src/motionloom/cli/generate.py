@@ -5,14 +5,14 @@ import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from motionloom.cli.finished import finished_motions
 from motionloom.cli.looping import check_loop
 from motionloom.cli.newcomers import one_sentence
-from motionloom.cli.options import add_options
 from motionloom.cli.sampling import (
-    add_sampling,
     bar,
     check_outs,
     check_prompt,
@@ -23,18 +23,20 @@ from motionloom.cli.sampling import (
     request_of,
     unknown_words,
 )
-from motionloom.cli.skeletons import add_one_file
+from motionloom.cli.skeletons import Target
 from motionloom.cli.writing import check_overwriting
+from motionloom.goals.remarks import numbers_read, parts_read
+from motionloom.goals.timeline import Timeline
+from motionloom.io.text import read_text
+from motionloom.kinematics.gestures import Seat
+from motionloom.kinematics.physics import TOES
+from motionloom.kinematics.stairs import stairs
+from motionloom.motion import Motion
 from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import SOLVER
-
-if TYPE_CHECKING:
-    from motionloom.cli.skeletons import Target
-    from motionloom.goals.timeline import Timeline
-    from motionloom.kinematics.gestures import Seat
-    from motionloom.motion import Motion
-    from motionloom.tasks.worded import Worded
-    from motionloom.weights.prior import Prior
+from motionloom.tasks.run import Models, Plan, run_each
+from motionloom.tasks.worded import Worded
+from motionloom.weights.prior import Prior
 
 SECONDS = 5.0
 """Length of one action where nothing is said of it."""
@@ -42,20 +44,8 @@ MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
 
 
-def add(subparsers) -> None:
-    """Register `generate`."""
-    parser = subparsers.add_parser("generate", help="make motions from words")
-    parser.add_argument("prompts", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
-    parser.add_argument(
-        "--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line, - for stdin"
-    )
-    add_options(parser, Generate)
-    add_one_file(parser)
-    add_sampling(parser)
-    parser.set_defaults(run=_generate)
-
-
-def _generate(arguments: argparse.Namespace) -> int:
+def run_generate(arguments: argparse.Namespace) -> int:
+    """``motionloom generate PROMPT``."""
     prompts = _prompts(arguments)
     outs, target = check_outs(arguments)
     if len(prompts) * arguments.count > MAX_MOTIONS:
@@ -71,9 +61,9 @@ def _generate(arguments: argparse.Namespace) -> int:
     remarks = unknown_words(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     worded: list[Worded] = []
-    drawn = _drawn(arguments, prior, [(prompt, timelines[prompt]) for prompt in prompts], worded, unknown=remarks)
+    drawn = _generated(arguments, prior, [(prompt, timelines[prompt]) for prompt in prompts], worded, unknown=remarks)
     seated: list[list[Seat]] = []
-    interrupted = made.take(([motion] for motion in _noting(seated, drawn, target)), told=arguments.json)
+    interrupted = made.take(([motion] for motion in _noting(seated, drawn, target)), measured=arguments.json)
     motions = [
         {
             "prompt": caption,
@@ -108,7 +98,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     return made.ended(interrupted)
 
 
-def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]", target: "Target | None") -> "Iterator[Motion]":
+def _noting(seated: list[list[Seat]], motions: Iterator[Motion], target: Target | None) -> Iterator[Motion]:
     """The motions as they come; the seats of each, as a character of that size needs them, are put into ``seated``."""
     from motionloom.kinematics.gestures import seats
 
@@ -118,12 +108,8 @@ def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]", target: "Ta
         yield motion
 
 
-def stairs_under(motion: "Motion") -> dict[str, Any] | None:
+def stairs_under(motion: Motion) -> dict[str, Any] | None:
     """The steps under somebody who climbs: their number and rise, and when and where each foot stands on one."""
-    import numpy as np
-
-    from motionloom.kinematics.physics import TOES
-    from motionloom.kinematics.stairs import stairs
 
     places = motion.positions()
     found = stairs(places, motion.fps)
@@ -137,14 +123,13 @@ def stairs_under(motion: "Motion") -> dict[str, Any] | None:
     return {"steps": found.steps, "rise": found.rise, "footholds": holds}
 
 
-def _moved(seat: "Seat", target: "Target", motion: "Motion") -> "Seat":
-    import numpy as np
+def _moved(seat: Seat, target: Target, motion: Motion) -> Seat:
 
     x, height, z = target.from_motion(motion).to_world(np.array([seat.x, seat.height, seat.z]) * target.size)
     return replace(seat, height=float(height), x=float(x), z=float(z))
 
 
-def _remark_seats(seated: "list[list[Seat]]") -> None:
+def _remark_seats(seated: list[list[Seat]]) -> None:
     """Say on stderr where a seat belongs: nothing is drawn but the person."""
     for number, seats in enumerate(seated, start=1):
         whose = f"motion {number} " if len(seated) > 1 else ""
@@ -156,9 +141,8 @@ def _remark_seats(seated: "list[list[Seat]]") -> None:
             )
 
 
-def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str, metre: float) -> "Timeline":
+def _timeline(arguments: argparse.Namespace, prior: Prior, prompt: str, metre: float) -> Timeline:
     """What a prompt asks, one segment or several; says so where there are several. metre: as of `Target.metre`."""
-    from motionloom.goals.remarks import numbers_read, parts_read
     from motionloom.tasks.worded import read
 
     found = read(
@@ -178,7 +162,7 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str, metre:
     return found
 
 
-def _segments(timeline: "Timeline") -> list[dict[str, object]]:
+def _segments(timeline: Timeline) -> list[dict[str, object]]:
     begins = [frame / 20 for frame in timeline.begins]
     return [
         {"begin": begin, "end": end, "text": segment.text}
@@ -208,7 +192,6 @@ def _prompts(arguments: argparse.Namespace) -> list[str]:
 
 
 def _lines(file: Path) -> list[str]:
-    from motionloom.io.text import read_text
 
     try:
         read = sys.stdin.buffer.read(16_000_000) if str(file) == "-" else read_text(file, max_bytes=16_000_000)
@@ -218,16 +201,15 @@ def _lines(file: Path) -> list[str]:
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
-def _drawn(
+def _generated(
     arguments: argparse.Namespace,
-    prior: "Prior",
-    asked: "list[tuple[str, Timeline]]",
-    worded: "list[Worded]",
+    prior: Prior,
+    asked: list[tuple[str, Timeline]],
+    worded: list[Worded],
     *,
     unknown: dict[str, str],
-) -> "Iterator[Motion]":
+) -> Iterator[Motion]:
     """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
-    from motionloom.tasks.run import Models, Plan, run_each
 
     plans = []
     for number, (prompt, timeline) in enumerate(asked):

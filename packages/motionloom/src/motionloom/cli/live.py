@@ -7,72 +7,31 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from motionloom.cli.duet import check_pair_outs, write_pairs
 from motionloom.cli.looping import check_loop, looped
-from motionloom.cli.options import add_options
-from motionloom.cli.robots import metres_told
-from motionloom.cli.sampling import add_adapters, check_outs, fail, load_prior
+from motionloom.cli.reading import load_motion
+from motionloom.cli.robots import note_on_metres
+from motionloom.cli.sampling import check_outs, fail, load_prior
 from motionloom.cli.sampling import write as write_files
-from motionloom.cli.skeletons import Target, add_skeleton
-from motionloom.cli.writing import add_writing, check_overwriting, check_unit
-from motionloom.requests.live import Live
-
-if TYPE_CHECKING:
-    from motionloom.live.clock import Health
-    from motionloom.live.live import Frame, Stage
-    from motionloom.live.script import Script
-    from motionloom.motion import Motion
-    from motionloom.weights.prior import Prior
-
-
-def add(subparsers) -> None:
-    """Register `live`."""
-    parser = subparsers.add_parser(
-        "live",
-        help="steer somebody while he moves, by a script",
-        description="Make the motion of a live session whose commands a YAML script says (docs/live.md).",
-    )
-    parser.add_argument("script", type=Path, metavar="SCRIPT", help="a .yaml file: seconds, seed, commands")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh); of two people a .bvh or "
-        ".npz holds one each: give two (default duet.glb)",
-    )
-    add_options(parser, Live)
-    parser.add_argument(
-        "--start",
-        type=Path,
-        action="append",
-        metavar="FILE",
-        help="a motion to go on from, in its place; with two people one for each",
-    )
-    parser.add_argument(
-        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
-    )
-    parser.add_argument(
-        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
-    )
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--clock", action="store_true", help="play it against the time and say how that went")
-    parser.add_argument("--check", action="store_true", help="only print what would be generated")
-    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
-    add_adapters(parser)
-    add_skeleton(parser)
-    add_writing(parser)
-    parser.set_defaults(run=_live)
+from motionloom.cli.skeletons import Target
+from motionloom.cli.writing import check_overwriting, check_unit
+from motionloom.kinematics.deeds import happened
+from motionloom.live.clock import Health, Player
+from motionloom.live.commands import scaled
+from motionloom.live.live import Frame, Live, Stage, motion_of
+from motionloom.live.pair import LivePair
+from motionloom.live.script import Script, read_script
+from motionloom.live.settings import Settings
+from motionloom.motion import Motion
+from motionloom.runtime import set_threads
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 
 
-def _live(arguments: argparse.Namespace) -> int:
-    from motionloom.kinematics.deeds import happened
-    from motionloom.live.commands import scaled
-    from motionloom.live.live import motion_of
-    from motionloom.live.script import read_script
-    from motionloom.runtime import set_threads
+def run_live(arguments: argparse.Namespace) -> int:
+    """``motionloom live SCRIPT``."""
 
     script = read_script(arguments.script)
     check_loop(arguments, script.seconds)
@@ -91,8 +50,8 @@ def _live(arguments: argparse.Namespace) -> int:
     seed = script.seed if arguments.seed is None else arguments.seed
     metre = 1.0 if target is None else target.metre
     if metre != 1.0 and any(scaled(one.command, 1 / metre) != one.command for one in script.commands):
-        print(f"note: {metres_told(metre)}", file=sys.stderr)
-    live = _made(arguments, script, prior, seed, metre=metre)
+        print(f"note: {note_on_metres(metre)}", file=sys.stderr)
+    live = _stage(arguments, script, prior, seed, metre=metre)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
     words = [[one.words for one in shown] for shown in frames]
     motions = [motion_of([shown[i] for shown in frames], live.fps) for i in range(script.people)]
@@ -104,12 +63,7 @@ def _live(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed: int, *, metre: float) -> "Stage":
-    from motionloom.cli.reading import load_motion
-    from motionloom.live.live import Live
-    from motionloom.live.pair import LivePair
-    from motionloom.live.settings import Settings
-    from motionloom.weights.pair import PairBlock
+def _stage(arguments: argparse.Namespace, script: Script, prior: Prior, seed: int, *, metre: float) -> Stage:
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
     starts = [load_motion(arguments, path) for path in arguments.start or ()]
@@ -120,10 +74,8 @@ def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed:
     return LivePair(prior, block, start=(starts[0], starts[1]) if starts else None, **shared)
 
 
-def _against_time(script: "Script", live: "Stage") -> tuple[list[tuple["Frame", ...]], "Health"]:
+def _against_time(script: Script, live: Stage) -> tuple[list[tuple[Frame, ...]], Health]:
     """The session as somebody would see it who asks at the script's times."""
-    from motionloom.live.clock import Player
-    from motionloom.live.live import Frame
 
     waiting = list(script.commands)[::-1]
     frames: list[tuple[Frame, ...]] = []
@@ -139,7 +91,7 @@ def _against_time(script: "Script", live: "Stage") -> tuple[list[tuple["Frame", 
 
 
 def _write(
-    motions: "Sequence[Motion]",
+    motions: Sequence[Motion],
     words: Sequence[Sequence[str]],
     outs: Sequence[Path],
     target: Target | None,
@@ -162,7 +114,7 @@ def _write(
 
 
 def _write_pair(
-    motions: "Sequence[Motion]",
+    motions: Sequence[Motion],
     words: Sequence[Sequence[str]],
     outs: Sequence[Path],
     target: Target | None,
@@ -176,9 +128,9 @@ def _write_pair(
 
 def _report(
     arguments: argparse.Namespace,
-    script: "Script",
+    script: Script,
     written: Sequence[Path],
-    health: "Health | None",
+    health: Health | None,
     made: dict[str, Any],
 ) -> None:
     if arguments.json:

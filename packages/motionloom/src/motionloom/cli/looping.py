@@ -2,20 +2,16 @@
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
 
 from motionloom.cli.sampling import fail, sampling_of
-
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
-    from motionloom.weights.prior import Prior
+from motionloom.motion import Motion
+from motionloom.tasks.edit import Loop, close
+from motionloom.weights.prior import Prior
 
 
 def check_loop(arguments: argparse.Namespace, seconds: float) -> None:
     """Refuse a ``--loop`` of motions that are too short for it."""
     if arguments.loop:
-        from motionloom.tasks.edit import Loop
-
         Loop(arguments.blend).check(seconds, 0.0)
 
 
@@ -41,14 +37,13 @@ def note_loop(arguments: argparse.Namespace, lost: str) -> None:
         print(f"note: the last {arguments.blend:g} s are generated again for --loop; {lost}", file=sys.stderr)
 
 
-def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text: str, *, seed: int) -> "Motion":
+def looped(arguments: argparse.Namespace, prior: Prior, motion: Motion, text: str, *, seed: int) -> Motion:
     """The motion with its end drawn anew so that the beginning can follow it, where the line says ``--loop``.
 
     text: what the person does there; without it ``--guidance`` is of no use to the prior.
     """
     if not arguments.loop:
         return motion
-    from motionloom.tasks.edit import close
 
     names = ("steps", "guidance") if text else ("steps",)
     settings = {name: value for name, value in sampling_of(arguments).items() if name in names}

@@ -87,3 +87,19 @@ def one_sentence(words: Sequence[str]) -> list[str]:
     if len(words) < 2 or any(" " in word.strip() for word in words):
         return list(words)
     return [" ".join(words)]
+
+
+def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
+    """Let TEXT stand behind options too: argparse gives up on an optional word once it has passed its place."""
+
+    def parse(args=None, namespace=None):
+        given = None if args is None else with_options(parser, args)
+        found, unknown = argparse.ArgumentParser.parse_known_args(parser, given, namespace)
+        words = [*([] if found.text is None else [found.text]), *unknown]
+        if not any(word.startswith("-") for word in unknown) and len(one_sentence(words)) == 1:
+            found.text, unknown = one_sentence(words)[0], []
+        if unknown:
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(parser, unknown)}")
+        return found, unknown
+
+    parser.parse_known_args = parse  # type: ignore[method-assign]

@@ -33,18 +33,18 @@ def add_options(
     parser: argparse.ArgumentParser,
     request: type,
     *names: str,
-    aliases: Sequence[str] = (),
-    helps: Mapping[str, str] = MappingProxyType({}),
+    changes: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> None:
     """An option for each of these fields of a request; without names, for all whose values can be typed.
 
-    aliases: other names of the first one's option. helps: other sentences of single fields.
+    Those that are there already are not added again. changes: of single fields another ``help``, and ``aliases``.
     """
     for name, spec in specs(request).items():
         typed = spec.kind in ("number", "whole", "flag", "word", "text") and not spec.needed
-        if not (name in names if names else typed):
+        if not (name in names if names else typed) or option(name, spec) in parser._option_string_actions:
             continue
-        sentence = helps.get(name, spec.help)
+        change = changes.get(name, {})
+        sentence = change.get("help", spec.help)
         if spec.kind == "flag":
             sentence = f"do not {sentence}" if spec.default else sentence
             kind = "store_false" if spec.default else "store_true"
@@ -55,7 +55,7 @@ def add_options(
         about += ["repeatable"] if spec.many else []
         parser.add_argument(
             option(name, spec),
-            *(aliases if (name,) == names[:1] else ()),
+            *change.get("aliases", ()),
             action=_Store,
             spec=spec,
             default=spec.default,
@@ -89,3 +89,18 @@ def _metavar(spec: Spec) -> str | tuple[str, ...]:
 
 def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
+
+
+def as_unit(text: str) -> float:
+    """Metres per unit of length, from a number or the unit's name."""
+    try:
+        value = _UNITS.get(text.lower()) or float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value <= 1e6:
+        units = ", ".join(_UNITS)
+        raise argparse.ArgumentTypeError(f"a unit is {units} or a number of metres above 0; got {text!r}")
+    return value

@@ -7,105 +7,39 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from motionloom.cli.finished import Finished
-from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_futures
+from motionloom.cli.futures import Long, Writing, targets, write_futures
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.looping import check_loop_behind
-from motionloom.cli.options import PrintSchema, add_options
-from motionloom.cli.reading import add_reading, check_size, crop, load_motion, note_rate, read_clip
-from motionloom.cli.sampling import add_sampling, bar, fail, request_of, results, sampling_of
+from motionloom.cli.reading import check_size, crop, load_motion, note_rate, read_clip
+from motionloom.cli.sampling import bar, fail, request_of, results, sampling_of
 from motionloom.cli.skeletons import Target, read_target
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
-from motionloom.formats import readable
-from motionloom.requests.fields import specs
-from motionloom.requests.predict import NAMES, Held, Predict, Switch
-from motionloom.requests.shared import FINISH
-
-if TYPE_CHECKING:
-    from motionloom.goals.hold import FixedJoints
-    from motionloom.motion import Motion
-    from motionloom.tasks.run import Plan
-    from motionloom.weights.predictor import Predictor
+from motionloom.goals import mask_file
+from motionloom.goals.hold import FixedJoints, FixedPart
+from motionloom.io import check_output
+from motionloom.io.stream import check_length, resampled
+from motionloom.motion import MAX_POSES, Motion
+from motionloom.requests.predict import Predict, Switch
+from motionloom.retarget import retarget
+from motionloom.tasks.predict import predict_pieces
+from motionloom.tasks.run import Models, Plan
+from motionloom.weights.predictor import Predictor
 
 LONG = 30.0
 """Seconds from which on futures are written while they are made, one after the other."""
-OPTIONS = (*NAMES, *FINISH)
 LISTED = 40
 """Files named at the end; --json lists all."""
 SAME_BONE = 1e-4
 """Metres by which bones of one skeleton may differ from file to file: numbers are rounded when they are written."""
 
 
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register ``predict`` and ``switch``."""
-    predict = subparsers.add_parser(
-        "predict",
-        help="make motions that may come after a motion file",
-        description=f"Make futures of a motion ({', '.join(readable())}): see docs/predict.md.",
-    )
-    predict.add_argument("past", type=Path, metavar="PAST")
-    add_options(predict, Predict, "seconds", *OPTIONS, aliases=["--horizon"], helps={"count": "futures to make"})
-    predict.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        metavar="FOLDER|NAME",
-        help="folder of the files, or a name as of other commands, repeatable (default futures)",
-    )
-    predict.add_argument(
-        "--format", action="append", choices=FORMATS, help="of the files in the folder, repeatable (default bvh)"
-    )
-    predict.add_argument("--no-picture", action="store_true", help="no overview.png and overlay film in the folder")
-    predict.add_argument(
-        "--hold",
-        action="append",
-        default=[],
-        metavar="PART",
-        help="part that moves as in --from, repeatable: a joint, a group such as lower_body, root",
-    )
-    predict.add_argument("--mask", type=Path, metavar="FILE", help="a JSON file of parts and when they are held")
-    predict.add_argument("--from", dest="source", type=Path, metavar="MOTION", help="what held parts move as")
-    add_options(predict, Held, "from_time")
-    predict.add_argument("--no-root", action="store_true", help=f"do not {specs(Predict)['root'].help}")
-    predict.add_argument("--schema", action=PrintSchema, kind="mask")
-    _add_sampling(predict, "--from")
-    predict.set_defaults(run=run_predict)
-    _add_switch(subparsers)
-
-
-def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    switch = subparsers.add_parser(
-        "switch",
-        help="join two motion files by a transition",
-        description="Write PAST, a transition and TARGET as one motion: see docs/predict.md.",
-    )
-    switch.add_argument("past", type=Path, metavar="PAST")
-    switch.add_argument("target", type=Path, metavar="TARGET")
-    add_options(switch, Switch, "seconds", "facing", *OPTIONS, helps={"count": "versions to make"})
-    _add_sampling(switch, "TARGET", out=".bvh .glb .npz .mp4 .gif .png (default switch.bvh)")
-    switch.set_defaults(run=run_switch)
-
-
-def _add_sampling(parser: argparse.ArgumentParser, other: str, *, out: str | None = None) -> None:
-    """How and where is sampled, how files are read; ``other`` is the second motion, in words."""
-    parser.add_argument("--retarget", action="store_true", help=f"put {other} on PAST's skeleton if it has another")
-    parser.add_argument(
-        "--loop-weights",
-        default="default",
-        metavar="NAME|PATH",
-        help="what draws the end for --loop (default: default)",
-    )
-    add_sampling(
-        parser, own_rate="PAST's", own_skeleton="PAST's", own_unit="PAST's, else m", out=out, weights="predictor"
-    )
-    add_reading(parser)
-
-
 def run_predict(arguments: argparse.Namespace) -> int:
     """``motionloom predict PAST``."""
-    from motionloom.tasks.run import Plan
 
     check_rate(arguments)
     _check_asked(arguments)
@@ -132,15 +66,14 @@ def run_predict(arguments: argparse.Namespace) -> int:
 
 def _written(
     arguments: argparse.Namespace,
-    plan: "Plan",
-    predictor: "Predictor",
+    plan: Plan,
+    predictor: Predictor,
     wanted: list[Files],
     writing: Writing,
     *,
-    note: "Callable[[], None]" = lambda: None,
+    note: Callable[[], None] = lambda: None,
 ) -> int:
     """Make and write the futures, all of them at once, and say so; after an interruption those that were finished."""
-    from motionloom.tasks.run import Models
 
     models, past = Models(arguments.loop_weights, predictor_weights=predictor, device=arguments.device), plan.people[0]
     if arguments.loop:
@@ -148,7 +81,7 @@ def _written(
     written: list[Path] = []
     given = _frames_at(arguments, past, len(past))
 
-    def write(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
+    def write(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
         written.extend(write_futures(wanted, motions, given, writing, caption=_caption(arguments)))
 
     made = Finished(
@@ -159,7 +92,7 @@ def _written(
         what="futures",
     )
     drawn = results("predicting", plan, models)
-    interrupted = made.take((list(one.people) for one in drawn), told=arguments.json)
+    interrupted = made.take((list(one.people) for one in drawn), measured=arguments.json)
     _report(arguments, [str(file) for file in written], made.count, made.happened)
     note()
     note_rate(arguments, _inputs(arguments))
@@ -168,8 +101,6 @@ def _written(
 
 def run_switch(arguments: argparse.Namespace) -> int:
     """``motionloom switch PAST TARGET``."""
-    from motionloom.io import check_output
-    from motionloom.tasks.run import Plan
 
     check_rate(arguments)
     outs = arguments.out or [Path("switch.bvh")]
@@ -194,7 +125,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
 
 
 def _predict_long(
-    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "FixedJoints | None", long: Long
+    arguments: argparse.Namespace, predictor: Predictor, past: Motion, *, hold: FixedJoints | None, long: Long
 ) -> int:
     """One future after the other, in memory that does not grow with their length."""
     if past.translations is not None:
@@ -209,7 +140,10 @@ def _predict_long(
     _report(arguments, lines, arguments.count)
     if interrupted:
         total = long.frames / (arguments.fps or past.fps)
-        print(f"motionloom: interrupted; what was finished is in {long.kept()} of {total:.2f} s", file=sys.stderr)
+        print(
+            f"motionloom: interrupted; what was finished is in {long.finished_files()} of {total:.2f} s",
+            file=sys.stderr,
+        )
         return 130
     _note_seen(predictor, past)
     note_rate(arguments, _inputs(arguments))
@@ -217,15 +151,13 @@ def _predict_long(
 
 
 def _pieces(
-    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "FixedJoints | None", *, frames: int
-) -> "Generator[Iterator[Motion], None, None]":
+    arguments: argparse.Namespace, predictor: Predictor, past: Motion, hold: FixedJoints | None, *, frames: int
+) -> Generator[Iterator[Motion], None, None]:
     """Of each future its pieces, while a bar shows how far they are."""
-    from motionloom.io.stream import resampled
-    from motionloom.tasks.predict import predict_pieces
 
     with bar("predicting") as move:
 
-        def moved(pieces: "Iterator[Motion]", done: int) -> "Iterator[Motion]":
+        def moved(pieces: Iterator[Motion], done: int) -> Iterator[Motion]:
             for piece in pieces:
                 yield piece
                 done += len(piece)
@@ -250,8 +182,7 @@ def _pieces(
 # What is read
 
 
-def _predictor(arguments: argparse.Namespace) -> "Predictor":
-    from motionloom.weights.predictor import Predictor
+def _predictor(arguments: argparse.Namespace) -> Predictor:
 
     return Predictor.load(arguments.weights, device=arguments.device)
 
@@ -266,9 +197,7 @@ def _caption(arguments: argparse.Namespace) -> str:
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(
-    arguments: argparse.Namespace, skin: Target | None, wanted: list[Files]
-) -> "tuple[Motion, Writing, int]":
+def _read_past(arguments: argparse.Namespace, skin: Target | None, wanted: list[Files]) -> tuple[Motion, Writing, int]:
     """The past, how files say its numbers, and the frames that are made behind it."""
     files = [file for one in wanted for file in one.files]
     check_unit(arguments, files)
@@ -283,11 +212,8 @@ def _read_past(
     return past, Writing(arguments.out_unit or unit or 1.0, orders, skin), horizon
 
 
-def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
+def _like_past(arguments: argparse.Namespace, path: Path, past: Motion) -> Motion:
     """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
-    import numpy as np
-
-    from motionloom.retarget import retarget
 
     alike = path.suffix.lower() == arguments.past.suffix.lower()
     motion = read_clip(arguments, path)[0] if alike else load_motion(arguments, path)
@@ -308,9 +234,8 @@ def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Mo
     return motion.resample(past.fps)
 
 
-def _difference(motion: "Motion", past: "Motion") -> str:
+def _difference(motion: Motion, past: Motion) -> str:
     """Why two motions are not of one skeleton, in words; nothing if they are, but for the last digits of a file."""
-    import numpy as np
 
     one, other = motion.skeleton, past.skeleton
     if one.names != other.names or one.parents != other.parents:
@@ -320,10 +245,8 @@ def _difference(motion: "Motion", past: "Motion") -> str:
     return "bones that change length" if motion.translations is not None and past.translations is None else ""
 
 
-def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "FixedJoints | None":
+def _hold(arguments: argparse.Namespace, past: Motion, horizon: int) -> FixedJoints | None:
     """What is held, if anything is."""
-    from motionloom.goals import mask_file
-    from motionloom.goals.hold import FixedJoints, FixedPart
 
     if not (arguments.hold or arguments.mask):
         if arguments.source is not None:
@@ -365,9 +288,8 @@ def _check_asked(arguments: argparse.Namespace) -> None:
         fail("--format csv is for a robot's joint angles; name its model with --robot")
 
 
-def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Files]) -> None:
+def _check_size(arguments: argparse.Namespace, past: Motion, horizon: int, wanted: list[Files]) -> None:
     """Refuse what no file or memory holds, and less than a frame."""
-    from motionloom.io.stream import check_length
 
     if horizon < 1:
         fail(f"{arguments.seconds:g} s are less than a frame of {arguments.past} ({1 / past.fps:.3g} s); give more")
@@ -378,13 +300,12 @@ def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wan
         _check_poses(arguments, frames * joints)
 
 
-def _frames_at(arguments: argparse.Namespace, past: "Motion", count: int) -> int:
+def _frames_at(arguments: argparse.Namespace, past: Motion, count: int) -> int:
     """How many frames so many of the past's rate become at ``--fps``, as `Motion.resample` makes them."""
     return count if arguments.fps is None else int((count - 1) / past.fps * arguments.fps + 1e-6) + 1
 
 
 def _check_poses(arguments: argparse.Namespace, each: int) -> None:
-    from motionloom.motion import MAX_POSES
 
     if each * arguments.count > MAX_POSES:
         fail(
@@ -396,7 +317,7 @@ def _check_poses(arguments: argparse.Namespace, each: int) -> None:
 # What is reported
 
 
-def _note_seen(predictor: "Predictor", past: "Motion") -> None:
+def _note_seen(predictor: Predictor, past: Motion) -> None:
     seen, there = predictor.observed / predictor.fps, past.seconds
     if there > seen + 1 / past.fps:
         print(f"note: of the {there:.2f} s of the past the predictor sees the last {seen:.2f}", file=sys.stderr)

@@ -3,91 +3,20 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from motionloom.cli.options import add_options
+from motionloom import io
 from motionloom.errors import MotionloomError
 from motionloom.formats import with_clips
-from motionloom.requests.export import Source, Stretch
-from motionloom.requests.shared import OnRobot
-
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
+from motionloom.io.bvh import read_bvh
+from motionloom.motion import Motion
+from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.upright import stood_up, up_axis
 
 RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
-_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
 
 
-def add_reading(command: argparse.ArgumentParser) -> None:
-    """How a file is read, and which part of it."""
-    command.add_argument(
-        "--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF read: m, cm, inch, or metres"
-    )
-    add_options(command, Source, "up")
-    command.add_argument(
-        "--clip",
-        dest="animation",
-        metavar="NAME|NUMBER",
-        help="animation of a .glb, .gltf, .vrm or .fbx (default: the newest that was added here, else the first)",
-    )
-    add_blender(command)
-    command.add_argument(
-        "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
-    )
-    add_robot(command)
-    add_options(command, Source, "source_fps")
-    add_options(command, Stretch, "start", "end")
-
-
-def add_blender(command: argparse.ArgumentParser) -> None:
-    """``--blender``, once."""
-    if "--blender" not in command._option_string_actions:
-        command.add_argument(
-            "--blender",
-            type=Path,
-            metavar="PROGRAM",
-            help="Blender, or a Python with bpy, for .fbx files (default: the one on the path)",
-        )
-
-
-def add_robot(command: argparse.ArgumentParser) -> None:
-    """``--robot`` and what goes with it, once."""
-    if "--robot" in command._option_string_actions:
-        return
-    command.add_argument(
-        "--robot",
-        type=Path,
-        metavar="MODEL",
-        help="a humanoid robot's model (.xml of MuJoCo, .urdf): its joint angles are written and read, .csv or .npz",
-    )
-    command.add_argument("--robot-map", type=Path, metavar="JSON", help="which joints are which, of the --robot")
-    add_options(command, OnRobot, "max_speed", "avoid_collisions")
-    command.add_argument("--no-header", action="store_true", help="leave the names out of a .csv")
-    command.add_argument("--figures", action="store_true", help="print how good the robot's clip is, as a line of JSON")
-
-
-def _number(text: str) -> float:
-    value = float(text)
-    if not abs(value) < 1e9:
-        raise ValueError
-    return value
-
-
-def as_unit(text: str) -> float:
-    """Metres per unit of length, from a number or the unit's name."""
-    try:
-        value = _UNITS[text.lower()] if text.lower() in _UNITS else _number(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-6 <= value <= 1e6:
-        units = ", ".join(_UNITS)
-        raise argparse.ArgumentTypeError(f"a unit is {units} or a number of metres above 0; got {text!r}")
-    return value
-
-
-def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float | None, dict[str, str]]":
+def read_clip(arguments: argparse.Namespace, path: Path) -> tuple[Motion, float | None, dict[str, str]]:
     """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
-    from motionloom import io
     from motionloom.cli.robots import read_motion, reads_as_clip
 
     if reads_as_clip(arguments, path):
@@ -99,8 +28,6 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         )
     unit, orders = None, {}
     if path.suffix.lower() == ".bvh" and not path.is_dir() and arguments.asf is None:
-        from motionloom.io.bvh import read_bvh
-
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
@@ -109,17 +36,15 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
     return _upright(motion, path, arguments), unit, orders
 
 
-def load_motion(arguments: argparse.Namespace, path: Path) -> "Motion":
+def load_motion(arguments: argparse.Namespace, path: Path) -> Motion:
     """A motion whose file needs no options; a robot's joint angles with the robot of the line."""
-    from motionloom import io
     from motionloom.cli.robots import read_motion, reads_as_clip
 
     return read_motion(arguments, path) if reads_as_clip(arguments, path) else io.load(path)
 
 
-def _upright(motion: "Motion", path: Path, arguments: argparse.Namespace) -> "Motion":
+def _upright(motion: Motion, path: Path, arguments: argparse.Namespace) -> Motion:
     """The motion with +Y up, as the line says or as people stand; a remark where the file was turned."""
-    from motionloom.retarget.upright import stood_up, up_axis
 
     wanted = arguments.up
     if wanted is None and path.suffix.lower() not in (".bvh", ".amc"):
@@ -143,9 +68,8 @@ HUMAN_LEGS = (0.5, 1.3)
 """Metres of thigh and shin."""
 
 
-def check_size(arguments: argparse.Namespace, path: Path, motion: "Motion") -> None:
+def check_size(arguments: argparse.Namespace, path: Path, motion: Motion) -> None:
     """Ask for the unit where bones are of no human length; a file of our own (.npz) or in a stated unit is believed."""
-    from motionloom.retarget.anatomy import read_body
 
     if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):
         return
@@ -161,7 +85,7 @@ def check_size(arguments: argparse.Namespace, path: Path, motion: "Motion") -> N
         )
 
 
-def crop(motion: "Motion", arguments: argparse.Namespace) -> "Motion":
+def crop(motion: Motion, arguments: argparse.Namespace) -> Motion:
     """The part between ``--start`` and ``--end``."""
     if arguments.start is None and arguments.end is None:
         return motion

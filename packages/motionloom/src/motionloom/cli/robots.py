@@ -11,9 +11,10 @@ from weakref import WeakKeyDictionary
 
 from motionloom.cli.skeletons import Target
 from motionloom.errors import MotionloomError
+from motionloom.motion import Motion
+from motionloom.retarget import to_smpl22
 
 if TYPE_CHECKING:
-    from motionloom.motion import Motion
     from motionloom.robots.body import Robot
     from motionloom.robots.clip import Clip
 
@@ -55,29 +56,28 @@ class RobotTarget(Target):
         """No file of a robot is a character's with one more animation."""
         return False
 
-    def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
+    def put(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
         """The motion as it is, or on the uniform person where a map says which joints are which."""
-        from motionloom.retarget import to_smpl22
 
         return motion if source_map is None else to_smpl22(motion, source_map)
 
-    def put_together(self, motions: "Sequence[Motion]") -> "list[Motion]":
+    def put_together(self, motions: Sequence[Motion]) -> list[Motion]:
         """Motions of one world, as they are."""
         return list(motions)
 
-    def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
+    def save(self, motion: Motion, path: Path, *, caption: str | None = None) -> Path:
         """Write the robot's clip, or a picture or a film of it; any other format gets the motion of its skeleton."""
         from motionloom.robots.files import save_clip
         from motionloom.robots.film import draw
 
         if path.suffix.lower() not in (*OUTS, *PICTURES):
             return super().save(self.shown(motion, path), path, caption=caption)
-        clip = self._made(motion, path)
+        clip = self._clip_of(motion, path)
         if path.suffix.lower() in OUTS:
             return save_clip(clip, self.robot, path, header=self.header)
         return draw(self.robot, clip.qpos, clip.fps, path, caption=caption or "")
 
-    def shown(self, motion: "Motion", path: Path) -> "Motion":
+    def shown(self, motion: Motion, path: Path) -> Motion:
         """The robot's clip as motion of its skeleton; one that was read keeps its rate."""
         from motionloom.robots.body import to_motion
 
@@ -85,15 +85,15 @@ class RobotTarget(Target):
         if known is not None and self.max_speed is None and not self.avoid:
             self.last[:] = [(motion, known)]
             return motion
-        clip = self._made(motion, path)
+        clip = self._clip_of(motion, path)
         return to_motion(self.robot, clip.qpos, clip.fps)
 
-    def _made(self, motion: "Motion", path: Path) -> "Clip":
+    def _clip_of(self, motion: Motion, path: Path) -> "Clip":
         if not self.last or self.last[0][0] is not motion:
             self.last[:] = [(motion, self.clip(motion, path))]
         return self.last[0][1]
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """How long the robot's clip is, at its own rate."""
         clip = self.last[0][1]
         length, hinges = len(clip) / clip.fps, len(self.robot.file.hinges)
@@ -103,7 +103,7 @@ class RobotTarget(Target):
         """Whether a clip that was read is written as it is."""
         return clip.fps == self.fps and self.max_speed is None and not self.avoid
 
-    def clip(self, motion: "Motion", path: Path) -> "Clip":
+    def clip(self, motion: Motion, path: Path) -> "Clip":
         """The motion as the robot does it, with a line on stderr about what became of it."""
         from motionloom.robots.clip import put_on_robot
         from motionloom.robots.figures import measure
@@ -132,7 +132,7 @@ class RobotTarget(Target):
         return clip
 
 
-def metres_told(metre: float) -> str:
+def note_on_metres(metre: float) -> str:
     """What goals on a robot are, of which ``metre`` is one of the person's that is drawn, for stderr."""
     said = "goals are in the robot's metres"
     return f"{said}; for the person that is generated, distances and speeds are {1 / metre:.2f} times as large"
@@ -148,7 +148,7 @@ def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
     fps = arguments.fps or FPS
     check_settings(fps, arguments.max_speed)
     robot = opened(arguments)
-    print(f"note: {robot.told()[-1]}", file=sys.stderr)
+    print(f"note: {robot.remarks()[-1]}", file=sys.stderr)
     return RobotTarget(
         name=str(arguments.robot),
         skeleton=robot.skeleton,
@@ -186,7 +186,7 @@ def reads_as_clip(arguments: argparse.Namespace, path: Path) -> bool:
     return True
 
 
-def read_motion(arguments: argparse.Namespace, path: Path, robot: "Robot | None" = None) -> "Motion":
+def read_motion(arguments: argparse.Namespace, path: Path, robot: "Robot | None" = None) -> Motion:
     """A robot's file as motion of its skeleton; robot: that of the line, where it was read."""
     from motionloom.robots.body import to_motion
     from motionloom.robots.files import load_clip
@@ -201,27 +201,6 @@ def read_motion(arguments: argparse.Namespace, path: Path, robot: "Robot | None"
     motion = to_motion(robot, clip.qpos, clip.fps)
     _READ[motion] = clip
     return motion
-
-
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register ``robot-check``."""
-    from motionloom.cli.reading import add_reading, add_robot
-
-    parser = subparsers.add_parser(
-        "robot-check",
-        help="say how good a robot's clip is",
-        description="Say how good a robot's clip is: soles, limits, speeds, hands and feet; of joint angles (.csv, "
-        ".npz) or of any motion, which is put on the robot first. Nothing is written.",
-    )
-    parser.add_argument("input", metavar="FILE", type=Path)
-    add_reading(parser)
-    add_robot(parser)
-    parser.add_argument("--source-map", type=Path, metavar="JSON", help="which joints are which, of FILE")
-    parser.add_argument(
-        "--physics", action="store_true", help="also follow the clip in MuJoCo with plain gains: when it falls"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.set_defaults(run=run_check, fps=None)
 
 
 def run_check(arguments: argparse.Namespace) -> int:

@@ -6,63 +6,24 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
-from motionloom.cli.newcomers import one_sentence, suggestion, with_options
-from motionloom.cli.options import add_options
-from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
+from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.terminal import escaping, unescaped
-from motionloom.cli.writing import add_writing, check_rate, check_unit
-from motionloom.errors import MotionloomError
-from motionloom.formats import writable
+from motionloom.cli.writing import check_rate, check_unit, fail
+from motionloom.goals.adapters import parse_adapter
+from motionloom.goals.remarks import remarks_on
+from motionloom.io import check_output, save
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.generate import Generate
 from motionloom.requests.reading import make
-from motionloom.requests.shared import Adapted
-
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
-    from motionloom.tasks.run import Models, Plan, Result
-    from motionloom.weights.prior import Prior
+from motionloom.tasks.adapting import adapt
+from motionloom.tasks.run import Models, Plan, Result, run
+from motionloom.weights.prior import Prior
 
 R = TypeVar("R")
-
-
-def add_sampling(
-    parser: argparse.ArgumentParser,
-    *,
-    own_rate: str = "the model's 20",
-    own_skeleton: str = "the uniform person's",
-    own_unit: str = "m",
-    out: str | None = "",
-    weights: str = "default",
-) -> None:
-    """``--out``, what motions are sampled with and where, and ``--skeleton``.
-
-    ``own_rate``, ``own_skeleton`` and ``own_unit`` are those of the files without ``--fps``, ``--skeleton`` and
-    ``--out-unit``, in words. out: what ``--out`` may be, in words; None: the command has its own. weights: a shipped
-    name; adapters are of the prior alone.
-    """
-    if out is not None:
-        meaning = out or f"{' '.join(writable())} (default motion.bvh; motion.glb for a character)"
-        add_out(parser, meaning)
-    parser.add_argument(
-        "--weights", default=weights, metavar="NAME|PATH", help=f"shipped name or file (default: {weights})"
-    )
-    if weights == "default":
-        add_adapters(parser)
-    parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
-    add_skeleton(parser, own=own_skeleton)
-    add_writing(parser, unit=own_unit)
-
-
-def add_out(parser: argparse.ArgumentParser, meaning: str) -> None:
-    """``--out``; ``meaning``: what it may be, in words."""
-    parser.add_argument(
-        "--out", type=Path, action="append", metavar="NAME", help=f"file to write, repeatable; {meaning}"
-    )
 
 
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -78,55 +39,22 @@ def request_of(arguments: argparse.Namespace, request: type[R], own: Mapping[str
     return make(request, said | dict(own))
 
 
-def results(label: str, plan: "Plan", models: "Models") -> "Iterator[Result]":
+def results(label: str, plan: Plan, models: Models) -> Iterator[Result]:
     """What a task makes, while a bar shows how far it is."""
-    from motionloom.tasks.run import run
 
     with bar(label) as progress:
         yield from run(plan, models, progress)
 
 
-def add_adapters(parser: argparse.ArgumentParser) -> None:
-    """``--adapter``, once: what was taught from clips."""
-    if "--adapter" not in parser._option_string_actions:
-        add_options(parser, Adapted)
-
-
-def load_prior(arguments: argparse.Namespace) -> "Prior":
+def load_prior(arguments: argparse.Namespace) -> Prior:
     """The weights that the line names, with its adapters in them."""
-    from motionloom.goals.adapters import parse_adapter
-    from motionloom.tasks.adapting import adapt
-    from motionloom.weights.prior import Prior
 
     adapters = [parse_adapter(word) for word in arguments.adapter]
     return adapt(Prior.load(arguments.weights, device=arguments.device), adapters)
 
 
-def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
-    """Let TEXT stand behind options too: argparse gives up on an optional word once it has passed its place."""
-
-    def parse(args=None, namespace=None):
-        given = None if args is None else with_options(parser, args)
-        found, unknown = argparse.ArgumentParser.parse_known_args(parser, given, namespace)
-        words = [*([] if found.text is None else [found.text]), *unknown]
-        if not any(word.startswith("-") for word in unknown) and len(one_sentence(words)) == 1:
-            found.text, unknown = one_sentence(words)[0], []
-        if unknown:
-            parser.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(parser, unknown)}")
-        return found, unknown
-
-    parser.parse_known_args = parse  # type: ignore[method-assign]
-
-
-def fail(message: str) -> NoReturn:
-    """Raise a `MotionloomError`."""
-
-    raise MotionloomError(message)
-
-
 def check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
     """The files to write and the skeleton; refuses what cannot be, before any work."""
-    from motionloom.io import check_output
 
     outs = arguments.out or own_outs(arguments, "motion")
     target = read_target(arguments, outs)
@@ -152,7 +80,6 @@ def places(outs: Sequence[Path], count: int, *, sheets: bool = True, target: Tar
 
     sheets: a picture or a page shows all motions, and so is one file; so is a character's own file with ``--one-file``.
     """
-    from motionloom.io import check_output
 
     def whole(out: Path) -> bool:
         own = target is not None and target.one_file and target.writes(out)
@@ -165,7 +92,7 @@ def places(outs: Sequence[Path], count: int, *, sheets: bool = True, target: Tar
 
 
 def write(
-    motions: "Sequence[Motion]",
+    motions: Sequence[Motion],
     files: Sequence[Path],
     captions: Sequence[str],
     target: Target | None = None,
@@ -173,8 +100,6 @@ def write(
     unit: float | None = None,
 ) -> list[Path]:
     """Motions, on the target's skeleton, into the files of one ``--out``; ``unit`` is a BVH's without a target."""
-    from motionloom.io import save
-    from motionloom.io.bvh_writer import save_bvh
 
     if target is not None and target.one_file and target.writes(files[0]):
         return [target.save_clips(motions, files[0], target.names(captions))]
@@ -204,14 +129,13 @@ def check_prompt(prompt: str) -> None:
     specs(Generate)["prompt"].check(prompt, "prompt")
 
 
-def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
+def remark_unknown(prior: Prior, prompts: Sequence[str]) -> list[str]:
     """Say on stderr, a line each, which prompts are not English or like nothing learned; and give the lines."""
     return list(unknown_words(prior, prompts).values())
 
 
-def unknown_words(prior: "Prior", prompts: Sequence[str]) -> dict[str, str]:
+def unknown_words(prior: Prior, prompts: Sequence[str]) -> dict[str, str]:
     """The prompts that `remark_unknown` has a line for, with the line."""
-    from motionloom.goals.remarks import remarks_on
 
     remarks = {one.text: one.line for one in remarks_on(prompts, prior.known, prior.text)}
     for line in remarks.values():

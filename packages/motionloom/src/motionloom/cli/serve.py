@@ -2,84 +2,12 @@
 
 import argparse
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.sampling import add_adapters, fail
+from motionloom.cli.writing import fail
 
 if TYPE_CHECKING:
     from motionloom.goals.adapters import Applied
-
-PROJECT = Path("motionloom-project")
-
-
-def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Register `serve` and `studio`."""
-    about = {
-        "serve": ("answer over HTTP, with the weights loaded once", "A server for pages and programs: docs/server.md."),
-        "studio": ("write, draw and watch motion in the browser", "Start the server and open the studio's page."),
-    }
-    for name, (short, long) in about.items():
-        parser = subparsers.add_parser(name, help=short, description=long)
-        _options(parser)
-        parser.set_defaults(run=run_serve, show=name == "studio")
-
-    assistant = subparsers.add_parser(
-        "mcp",
-        help="let an assistant make motion (MCP)",
-        description="Serve generate_motion, compose and export over standard input and output: docs/server.md.",
-    )
-    _project(assistant)
-    _threads(assistant, "as many as cores")
-    _model(assistant)
-    assistant.set_defaults(run=run_mcp)
-
-
-def _options(parser: argparse.ArgumentParser) -> None:
-    _project(parser)
-    _threads(parser, "one less than there are cores, for the page")
-    parser.add_argument("--host", default="127.0.0.1", help="address to bind to (default 127.0.0.1: this machine only)")
-    parser.add_argument("--port", type=int, default=8020, help="port, 0 for any that is free (default 8020)")
-    parser.add_argument("--token", help="what clients must send; made and printed where --host is not this machine")
-    parser.add_argument(
-        "--allow-host", action="append", default=[], metavar="NAME", help="a further name of this server, repeatable"
-    )
-    parser.add_argument(
-        "--allow-origin",
-        action="append",
-        default=[],
-        metavar="URL",
-        help="a page's origin, such as http://localhost:5173, that may ask too, repeatable",
-    )
-    parser.add_argument(
-        "--robot",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="MODEL",
-        help="a humanoid robot's model whose joint angles live sessions may ask for by the file's name, repeatable",
-    )
-    _model(parser)
-
-
-def _project(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--project",
-        type=Path,
-        default=PROJECT,
-        metavar="FOLDER",
-        help="the only folder that is read and written, made if missing (default motionloom-project)",
-    )
-
-
-def _model(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    add_adapters(parser)
-
-
-def _threads(parser: argparse.ArgumentParser, default: str) -> None:
-    parser.add_argument("--threads", type=int, metavar="N", help=f"CPU threads (default: {default})")
 
 
 def run_serve(arguments: argparse.Namespace) -> None:

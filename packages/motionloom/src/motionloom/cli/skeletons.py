@@ -2,48 +2,32 @@
 
 import argparse
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from motionloom.cli.options import add_options
-from motionloom.cli.reading import add_robot
+from motionloom import io
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters, find, readable
-from motionloom.requests.export import OnSkeleton
-
-if TYPE_CHECKING:
-    from motionloom.ground import GroundPose
-    from motionloom.io.character import Character
-    from motionloom.io.stream import Stream
-    from motionloom.motion import Motion
-    from motionloom.retarget import RootMode
-    from motionloom.retarget.anatomy import Body
-    from motionloom.retarget.hands import HandPose
-    from motionloom.skeleton import Skeleton
-
-
-def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
-    """``--skeleton`` and what goes with it; ``own`` is whose skeleton motions have without it, in words."""
-    parser.add_argument(
-        "--skeleton",
-        metavar="FILE|NAME",
-        help="put motions on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is "
-        f"written as that file with one more animation (default: {own})",
-    )
-    add_options(parser, OnSkeleton, "root", "hands", "at")
-    parser.add_argument(
-        "--clip-name",
-        metavar="NAME",
-        action="append",
-        help="name of the animation in the character's file; repeatable, one for each motion",
-    )
-    parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
-    parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
-    add_robot(parser)
+from motionloom.ground import GroundPose
+from motionloom.io.asf import load_skeleton
+from motionloom.io.bvh import read_bvh
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.io.character import Character
+from motionloom.io.gltf_read import open_glb
+from motionloom.io.stream import Kept, Stream
+from motionloom.motion import Motion, ground_pose
+from motionloom.retarget import RootMode, retarget
+from motionloom.retarget.anatomy import Body, read_body
+from motionloom.retarget.hands import HandPose, check_fingers, pose_hands
+from motionloom.retarget.named import NAMED, named_skeleton
+from motionloom.retarget.root import place_root
+from motionloom.retarget.stand import HERE, moved, shares_world, started, world_of
+from motionloom.retarget.toes import bend_toes
+from motionloom.skeleton import SMPL22, Skeleton
 
 
 @dataclass(frozen=True)
@@ -51,14 +35,14 @@ class Target:
     """A skeleton that motions are put on, and how its own file says things."""
 
     name: str
-    skeleton: "Skeleton"
+    skeleton: Skeleton
     unit: float = 1.0
     orders: dict[str, str] = field(default_factory=dict)
-    character: "Character | None" = None
+    character: Character | None = None
     at: str | None = None
     """Where motions start: character or origin; None: where the character stands, if that is not the origin."""
-    root: "RootMode" = "motion"
-    hands: "HandPose" = "as-is"
+    root: RootMode = "motion"
+    hands: HandPose = "as-is"
     joint_map: Path | None = None
     clip_names: tuple[str, ...] = ()
     """Of the animations that are written: none, one for all, or one for each."""
@@ -66,18 +50,16 @@ class Target:
     one_file: bool = False
     """Whether several motions become animations of one file."""
 
-    def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
+    def put(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
         """The motion on this skeleton, where the character stands; ``source`` names it in an error."""
-        from motionloom.retarget.stand import shares_world, started
 
         place = self.place
         if place is None or (self.at is None and shares_world(motion, self.skeleton)):
             return self._put(motion, lambda made, body: made, source, source_map)
         return self._put(motion, lambda made, body: started(made, body, place), source, source_map)
 
-    def put_together(self, motions: "Sequence[Motion]") -> "list[Motion]":
+    def put_together(self, motions: Sequence[Motion]) -> list[Motion]:
         """Motions of one world, each on this skeleton, the world's origin where the character stands."""
-        from motionloom.retarget.stand import HERE, moved
 
         world = self.place or HERE
         return [
@@ -87,16 +69,11 @@ class Target:
 
     def _put(
         self,
-        motion: "Motion",
-        move: "Callable[[Motion, Body], Motion]",
+        motion: Motion,
+        move: Callable[[Motion, Body], Motion],
         source: str = "the motion",
         source_map: Path | None = None,
-    ) -> "Motion":
-        from motionloom.retarget import retarget
-        from motionloom.retarget.anatomy import read_body
-        from motionloom.retarget.hands import pose_hands
-        from motionloom.retarget.root import place_root
-        from motionloom.retarget.toes import bend_toes
+    ) -> Motion:
 
         try:
             made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map)
@@ -107,9 +84,8 @@ class Target:
         return pose_hands(place_root(move(bend_toes(made, body), body), body, self.root), self.hands, self.joint_map)
 
     @property
-    def place(self) -> "GroundPose | None":
+    def place(self) -> GroundPose | None:
         """Where motions are to start; None: where they do."""
-        from motionloom.retarget.stand import HERE
 
         if self.character is None:
             return None
@@ -118,10 +94,8 @@ class Target:
         own = self.character.stand
         return own if self.at == "character" or own != HERE else None
 
-    def from_motion(self, motion: "Motion") -> "GroundPose":
+    def from_motion(self, motion: Motion) -> GroundPose:
         """Where the world of a uniform person's motion, at this size, is in the world of what `put` makes of it."""
-        from motionloom.motion import ground_pose
-        from motionloom.retarget.stand import HERE, world_of
 
         place = self.place
         return HERE if place is None else world_of(ground_pose(motion.thinned(1).positions()[0] * self.size), place)
@@ -134,8 +108,6 @@ class Target:
     @property
     def size(self) -> float:
         """How long its legs are, in those of the uniform person: a walk goes so much further on it."""
-        from motionloom.retarget.anatomy import read_body
-        from motionloom.skeleton import SMPL22
 
         return read_body(self.skeleton, self.joint_map).leg / read_body(SMPL22).leg
 
@@ -166,12 +138,11 @@ class Target:
         several = self.clip_names * len(captions) if len(self.clip_names) == 1 else self.clip_names
         return list(several or captions)
 
-    def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
+    def save(self, motion: Motion, path: Path, *, caption: str | None = None) -> Path:
         """Write a motion that is `put` on the skeleton; the suffix picks the format.
 
         ``caption`` labels a picture, and is the animation's name where the line gives none.
         """
-        from motionloom import io
 
         if self.character is not None and self.writes(path):
             name = self.clip_names[0] if len(self.clip_names) == 1 else caption
@@ -183,16 +154,14 @@ class Target:
         if self.plays_in(path):
             return self.save_page([(caption or "", [motion])], path)
         if path.suffix.lower() == ".bvh":
-            from motionloom.io.bvh_writer import save_bvh
-
             return save_bvh(motion, path, order=self.orders, unit=self.unit)
         return io.save(motion, path, captions=None if caption is None else [caption])
 
-    def shown(self, motion: "Motion", path: Path) -> "Motion":
+    def shown(self, motion: Motion, path: Path) -> Motion:
         """A motion that is `put` on the skeleton, as a file that holds poses gets it."""
         return motion
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """What the file that was written last holds, where that is not the motion as it was put; else empty."""
         return ""
 
@@ -200,22 +169,21 @@ class Target:
         """Whether a file of this name is a page in which the character plays."""
         return self.character is not None and path.suffix.lower() == ".html"
 
-    def save_page(self, takes: "Sequence[tuple[str, Sequence[Motion]]]", path: Path) -> Path:
+    def save_page(self, takes: Sequence[tuple[str, Sequence[Motion]]], path: Path) -> Path:
         """Write takes, names and people that are `put` on the skeleton, as a page in which the character plays."""
         from motionloom.viz.page import Take, write_page
 
         return write_page([Take(name, people) for name, people in takes], path, character=self.character)
 
-    def save_clips(self, motions: "Sequence[Motion]", path: Path, names: Sequence[str]) -> Path:
+    def save_clips(self, motions: Sequence[Motion], path: Path, names: Sequence[str]) -> Path:
         """Write motions that are `put` on the skeleton as animations of the character's own file."""
         assert self.character is not None
         return self._save_own(self.character, list(zip(motions, names, strict=True)), path)
 
-    def _save_own(self, character: "Character", clips: "Sequence[tuple[Motion, str | None]]", path: Path) -> Path:
+    def _save_own(self, character: Character, clips: Sequence[tuple[Motion, str | None]], path: Path) -> Path:
         """The character's own file with more animations; as FBX by way of a GLB."""
         if path.suffix.lower() != ".fbx":
             return character.save_clips(clips, path, replace=self.replace)
-        import tempfile
 
         from motionloom.io.blender import glb_to_fbx
 
@@ -227,13 +195,6 @@ class Target:
                 return glb_to_fbx(made, path, fps=clips[0][0].fps)
             except MotionloomError as error:
                 raise MotionloomError(str(error).replace(str(made), str(character.path))) from None
-
-
-def add_one_file(parser: argparse.ArgumentParser) -> None:
-    """``--one-file``."""
-    parser.add_argument(
-        "--one-file", action="store_true", help="write several motions of a character as animations of one file"
-    )
 
 
 def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:
@@ -301,7 +262,6 @@ def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None
     bodies = [out for out in outs if out.suffix.lower() in (".glb", ".usda", ".fbx")]
     if not isinstance(source, Path) or source.suffix.lower() not in characters(alone=True) or not bodies:
         return
-    from motionloom.io.gltf_read import open_glb
 
     found = open_glb(source).document.json
     if found.get("meshes") and found.get("asset", {}).get("generator") != "motionloom":
@@ -313,8 +273,6 @@ def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None
 
 def _check_humanoid(target: Target) -> None:
     """Refuse a skeleton that is no person, or has no fingers for ``--hands``, before anything is drawn."""
-    from motionloom.retarget.anatomy import read_body
-    from motionloom.retarget.hands import check_fingers
 
     try:
         body = read_body(target.skeleton, target.joint_map)
@@ -331,8 +289,6 @@ def _check_humanoid(target: Target) -> None:
 
 
 def _find(arguments: argparse.Namespace) -> Target:
-    from motionloom import io
-    from motionloom.retarget.named import NAMED, named_skeleton
 
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
@@ -348,13 +304,9 @@ def _find(arguments: argparse.Namespace) -> Target:
     if name.lower() in NAMED and not path.exists():
         return Target(name, named_skeleton(name.lower()), **options)
     if suffix == ".bvh":
-        from motionloom.io.bvh import read_bvh
-
         file = read_bvh(path)
         return Target(name, file.motion.skeleton, unit=file.unit, orders=dict(file.orders), **options)
     if suffix == ".asf":
-        from motionloom.io.asf import load_skeleton
-
         return Target(name, load_skeleton(path), **options)
     if find(path).character:
         character = io.open_character(path, joint_map=arguments.target_map)
@@ -366,14 +318,13 @@ def _find(arguments: argparse.Namespace) -> Target:
     return Target(name, io.load(path).skeleton, **options)
 
 
-def open_target(target: Target, path: Path, *, caption: str = "") -> "Stream":
+def open_target(target: Target, path: Path, *, caption: str = "") -> Stream:
     """A file whose motion is put on the skeleton when all of it is there."""
-    from motionloom.io.stream import Kept
 
     target.names([caption])
     return Kept(path, lambda whole: target.save(target.put(whole), path, caption=caption))
 
 
-def put_all(target: Target | None, motions: "Iterable[Motion]") -> "list[Motion]":
+def put_all(target: Target | None, motions: Iterable[Motion]) -> list[Motion]:
     """Motions on the target's skeleton; as they are without one."""
     return list(motions) if target is None else [target.put(motion) for motion in motions]

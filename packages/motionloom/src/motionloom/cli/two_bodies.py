@@ -1,16 +1,14 @@
 """How near two people come to each other, as `motionloom duet` reports it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
+from motionloom.kinematics.capsules import DEEP, overlap, trunk_distance, wrist_distance
+from motionloom.motion import Motion
+from motionloom.retarget import joints22
 
 
-def two_body_measures(duet: "Sequence[Motion]") -> dict[str, float]:
+def two_body_measures(duet: Sequence[Motion]) -> dict[str, float]:
     """How near the two bodies and their hands come, and how deep and in how many frames they are in each other."""
-    from motionloom.kinematics.capsules import DEEP, overlap, trunk_distance, wrist_distance
-    from motionloom.retarget import joints22
 
     first, second = (joints22(person) for person in duet)
     apart, depth = trunk_distance(first, second), overlap(first, second)

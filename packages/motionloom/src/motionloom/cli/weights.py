@@ -4,45 +4,23 @@ import argparse
 import json
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.cli.writing import check_overwriting
 from motionloom.errors import MotionloomError
-
-if TYPE_CHECKING:
-    from motionloom.weights.predictor import Predictor
-    from motionloom.weights.prior import Prior
-
+from motionloom.io.atomic import check_place
+from motionloom.weights.adapter import read_adapter
+from motionloom.weights.container import ADAPTERS, PAIRS, PREDICTORS
+from motionloom.weights.pair import blocks, read_block
+from motionloom.weights.predictor import Predictor, load_predictor, shipped_predictors
+from motionloom.weights.prior import Prior, find_weights, load_prior, shipped
 
 TRAINING = "motionloom_train.convert"
 """The module that writes graphs, which needs PyTorch."""
 
 
-def add(subparsers) -> None:
-    """Register `weights`."""
-    parser = subparsers.add_parser(
-        "weights", help="what a weight file holds, or which ones ship with motionloom; older files as ones of today"
-    )
-    parser.add_argument(
-        "weights",
-        nargs="*",
-        metavar="NAME|FILE",
-        help="a shipped name or a file (default: list the shipped); or: convert OLD.safetensors NEW.safetensors, which "
-        "writes the graphs of its networks into a file that has none",
-    )
-    parser.add_argument(
-        "--prior", type=Path, metavar="FILE", help="to convert a two-person block: the prior it belongs to, if not ours"
-    )
-    add_force(parser)
-    parser.add_argument("--actions", action="store_true", help="list what a prior has learned, with seconds of each")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.set_defaults(run=_weights)
-
-
-def _weights(arguments: argparse.Namespace) -> None:
-    from motionloom.weights.pair import blocks
-    from motionloom.weights.predictor import shipped_predictors
-    from motionloom.weights.prior import find_weights, shipped
+def run_weights(arguments: argparse.Namespace) -> None:
+    """``motionloom weights NAME``."""
 
     if arguments.weights[:1] == ["convert"]:
         _convert(arguments)
@@ -74,7 +52,6 @@ def _weights(arguments: argparse.Namespace) -> None:
 
 def _convert(arguments: argparse.Namespace) -> None:
     """Write an older file again with graphs; raises MotionloomError where it cannot be, or PyTorch is missing."""
-    from motionloom.io.atomic import check_place
 
     if len(arguments.weights) != 3 or arguments.actions or arguments.json:
         raise MotionloomError(
@@ -93,7 +70,6 @@ def _convert(arguments: argparse.Namespace) -> None:
 
 def _actions(arguments: argparse.Namespace) -> None:
     """Print what a prior has learned; raises MotionloomError for weights that do not say."""
-    from motionloom.weights.prior import Prior
 
     weights = arguments.weights[0] if arguments.weights else "default"
     known = Prior.load(weights).known
@@ -113,7 +89,6 @@ def _actions(arguments: argparse.Namespace) -> None:
 
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
-    from motionloom.weights.container import ADAPTERS, PAIRS, PREDICTORS
 
     kinds = ((PREDICTORS, _predictor), (PAIRS, _block), (ADAPTERS, _adapter))
     said = next((read for kind, read in kinds if kind.signed(path)), _prior)(path)
@@ -122,7 +97,6 @@ def describe(path: Path, name: str | None = None) -> dict[str, Any]:
 
 
 def _prior(path: Path) -> dict[str, Any]:
-    from motionloom.weights.prior import load_prior
 
     prior = load_prior(path)
     config = prior.net.config
@@ -131,7 +105,6 @@ def _prior(path: Path) -> dict[str, Any]:
 
 
 def _predictor(path: Path) -> dict[str, Any]:
-    from motionloom.weights.predictor import load_predictor
 
     predictor = load_predictor(path)
     frames = {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed}
@@ -141,7 +114,7 @@ def _predictor(path: Path) -> dict[str, Any]:
 
 
 def _network(
-    whole: "Prior | Predictor", kind: str, variant: str, *, sizes: dict[str, int], seen: dict[str, Any]
+    whole: Prior | Predictor, kind: str, variant: str, *, sizes: dict[str, int], seen: dict[str, Any]
 ) -> dict[str, Any]:
     """What there is to say of both kinds of networks, with their own ``sizes`` and what they see of a motion."""
     config = whole.net.config
@@ -160,7 +133,6 @@ def _network(
 
 
 def _block(path: Path) -> dict[str, Any]:
-    from motionloom.weights.pair import read_block
 
     block = read_block(path)
     config = block.config
@@ -178,7 +150,6 @@ def _block(path: Path) -> dict[str, Any]:
 
 
 def _adapter(path: Path) -> dict[str, Any]:
-    from motionloom.weights.adapter import read_adapter
 
     adapter = read_adapter(path)
     return {
@@ -207,7 +178,7 @@ def _card(about: dict[str, Any]) -> str:
     if "belongs_to" in about:
         rows["prior"] = f"{about['belongs_to']['name']} ({about['belongs_to']['fingerprint'][:12]}), no other"
     if "schedule" in about:
-        rows["motion"] = f"{_seen(about)}, {about['frames_per_second']:g} frames per second"
+        rows["motion"] = f"{_inputs_of(about)}, {about['frames_per_second']:g} frames per second"
         rows["schedule"] = f"{about['schedule']['name']}, {about['schedule']['steps']} levels"
     if "text" in about:
         rows["text"] = about["text"]
@@ -215,7 +186,7 @@ def _card(about: dict[str, Any]) -> str:
     return "\n".join(f"{key:<9} {value}" for key, value in rows.items())
 
 
-def _seen(about: dict[str, Any]) -> str:
+def _inputs_of(about: dict[str, Any]) -> str:
     if "joints" not in about:
         return f"{about['features']} numbers per frame"
     return f"{len(about['joints'])} joints, {about['frames']['predicted']} frames after {about['frames']['observed']}"

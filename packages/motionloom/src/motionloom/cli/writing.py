@@ -4,27 +4,17 @@ import argparse
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from motionloom.cli.reading import add_blender, as_unit
 from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
 
 
-def add_writing(parser: argparse.ArgumentParser, *, unit: str = "m") -> None:
-    """``--out-unit`` and ``--force``; ``unit`` is what a BVH is in without it, in words."""
-    parser.add_argument(
-        "--out-unit", type=as_unit, metavar="UNIT", help=f"unit of a BVH written: m, cm, inch, or metres ({unit})"
-    )
-    add_force(parser)
-    add_blender(parser)
-
-
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """``--force``, for `check_overwriting`."""
-    parser.add_argument("--force", action="store_true", help="write over files without saying so")
+def fail(message: str) -> NoReturn:
+    """Raise a `MotionloomError`."""
+    raise MotionloomError(message)
 
 
 def check_rate(arguments: argparse.Namespace) -> None:

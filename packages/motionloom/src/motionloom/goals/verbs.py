@@ -1,13 +1,11 @@
 """Verbs in the words of prompts: their forms, what kind of action each names, and who does it."""
 
 import re
-import tomllib
-from importlib import resources
 from typing import Any
 
-_TABLES: dict[str, Any] = tomllib.loads(
-    (resources.files("motionloom.goals") / "verbs.toml").read_text(encoding="utf-8")
-)
+from motionloom.reading import read_table
+
+_TABLES: dict[str, Any] = read_table("motionloom.goals", "verbs.toml")
 
 NOUNS_AFTER = {"do", "make", "perform", "throw", "take", "give", "practice", "play"}
 """Verbs behind which "kicks and punches" are things."""

@@ -80,7 +80,7 @@ def new_part(folder: Path, suffix: str = "", *, is_folder: bool = False) -> Iter
         sweep(folder)
     with ExitStack() as stack:
         with held_back():
-            part, file = _made(folder, suffix, is_folder=is_folder)
+            part, file = _new_part(folder, suffix, is_folder=is_folder)
             stack.callback(_remove, part, file, is_folder=is_folder)
         yield part
 
@@ -94,7 +94,7 @@ def _remove(part: Path, file: int, *, is_folder: bool) -> None:
         os.close(file)
 
 
-def _made(folder: Path, suffix: str, *, is_folder: bool) -> tuple[Path, int]:
+def _new_part(folder: Path, suffix: str, *, is_folder: bool) -> tuple[Path, int]:
     while True:
         part = folder / f".{os.urandom(6).hex()}.part{suffix}"
         if is_folder:

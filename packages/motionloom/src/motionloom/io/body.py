@@ -70,13 +70,13 @@ def _local(shape: Figure, world: Array, joint: int, target: Array) -> Array:
     return np.median(rot.rotate(rot.inverse(world[:, joint]), target), axis=0)
 
 
-def _seen(shape: Figure, world: Array, joint: int, point: Array) -> Array:
+def _local_to(shape: Figure, world: Array, joint: int, point: Array) -> Array:
     return _local(shape, world, joint, point - shape.places[:, joint])
 
 
 def _bone(motion: Motion, shape: Figure, world: Array, i: int) -> Piece | None:
     parent, child = shape.bones[i]
-    tip = _seen(shape, world, parent, shape.places[:, child])
+    tip = _local_to(shape, world, parent, shape.places[:, child])
     piece = _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), np.repeat(shape.radii[i], 2).reshape(2, 2))
     below = motion.skeleton.children(child)
     foot = set(below) <= motion.skeleton.ends and set(shape.hips[:-1]) & set(motion.skeleton.ancestors(parent))
@@ -105,7 +105,7 @@ def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) ->
     right = [j for j in joints if shape.sides[j] < 0]
     if not left or not right:
         return None
-    a, b = (_seen(shape, world, base, shape.places[:, j[0]]) for j in (left, right))
+    a, b = (_local_to(shape, world, base, shape.places[:, j[0]]) for j in (left, right))
     across, middle = a - b, (a + b) / 2
     up = _local(shape, world, base, np.broadcast_to([0.0, 1.0, 0.0], (len(world), 3)))
     half = float(np.linalg.norm(across)) / 2
@@ -122,7 +122,7 @@ def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) ->
 
 def _between(shape: Figure, world: Array) -> Piece | None:
     """The belly, carried by the pelvis."""
-    tip = _seen(shape, world, shape.centre, shape.places[:, shape.chest[-1]])
+    tip = _local_to(shape, world, shape.centre, shape.places[:, shape.chest[-1]])
     a, b = (shape.places[:, next(j for j in shape.hips if shape.sides[j] == s)] for s in (1, -1))
     across = _local(shape, world, shape.centre, a - b)
     rings = shape.height * np.array([[0.075, 0.055], [0.078, 0.055]])
@@ -137,7 +137,7 @@ def _head(shape: Figure, world: Array) -> Piece | None:
     direction = shape.places[:, joint] - shape.places[:, below]
     up = _local(shape, world, carrier, direction)
     up = up / max(float(np.linalg.norm(up)), 1e-9)
-    tip = _seen(shape, world, carrier, shape.places[:, joint])
+    tip = _local_to(shape, world, carrier, shape.places[:, joint])
     radius = 0.055 * shape.height
     middle = tip - 0.75 * radius * up if shape.head_is_tip else tip + 0.85 * radius * up
     ends = np.stack([middle - 0.3 * radius * up, middle + 0.3 * radius * up])

@@ -25,7 +25,7 @@ from motionloom.io.glb import Document, pack_glb, read_document_chunks
 from motionloom.io.gltf_bind import on_floor
 from motionloom.io.gltf_mesh import Surface, read_surfaces
 from motionloom.io.gltf_nodes import Node, printable, upwards
-from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
+from motionloom.io.gltf_read import OpenedGlb, open_glb, without_still_armatures
 from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
@@ -211,7 +211,7 @@ def load_character(path: str | Path, *, joint_map: Override | None = None) -> Ch
     file = open_glb(path)
     problem: MotionloomError | None = None
     for person in range(len(file.people)):
-        nodes, joints, _ = settled(file, person, {})
+        nodes, joints, _ = without_still_armatures(file, person, {})
         rig = read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset())
         try:
             found = find_joints(rig.skeleton, joint_map)

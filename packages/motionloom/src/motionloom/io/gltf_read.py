@@ -116,7 +116,7 @@ def _motion(file: OpenedGlb, person: int, clip: int | None) -> Motion:
     moved = {} if clip is None else file.channels[clip]
     joints = file.people[person]
     curves = read_curves(document, {key: sampler for key, sampler in moved.items() if key[0] in joints})
-    nodes, joints, curves = settled(file, person, curves)
+    nodes, joints, curves = without_still_armatures(file, person, curves)
     declared = None if clip is None else declared_fps(document.items("animations")[clip])
     fps, times = clock(document, curves, len(joints), declared)
     turned = {node for node, path in curves if path == "rotation"}
@@ -188,7 +188,7 @@ def _groups(nodes: set[int], order: list[int], parents: list[int]) -> list[list[
     return result
 
 
-def settled(file: OpenedGlb, person: int, curves: Curves) -> tuple[list[Node], frozenset[int], Curves]:
+def without_still_armatures(file: OpenedGlb, person: int, curves: Curves) -> tuple[list[Node], frozenset[int], Curves]:
     """Let go of armature objects over the skeleton that are keyed but never move: they become fixed transforms."""
     joints, parents = file.people[person], file.parents
     if len(joints) > MAX_JOINTS:

@@ -61,9 +61,9 @@ class Robot:
         """Metres of the robot's that one of the uniform person's becomes: the lengths of their legs."""
         return read_body(self.skeleton).leg / read_body(SMPL22).leg
 
-    def told(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What a user should know: which hinges are which, and what the file lacks."""
-        return (*self.notes, f"{self.name}: {self.parts.told()} (--robot-map says otherwise)")
+        return (*self.notes, f"{self.name}: {self.parts.summary()} (--robot-map says otherwise)")
 
     def site(self, joint: str) -> str:
         """The name of a joint's site in the model."""

@@ -75,15 +75,15 @@ class _Foot:
 
     def step(self, place: Array, turn: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Place (3,) and turn (4,) of the ankle in a frame, and which of heel and toes are planted."""
-        stands, asked = self._stands(place, turn), (place, turn)
+        stands, asked = self._is_on_ground(place, turn), (place, turn)
         if stands != (self.stance is not None):
-            now = self._faded(*self._asked(*asked))
+            now = self._faded(*self._sole_pose(*asked))
             self.stance = self._stood(*now) if stands else None
-            to = self._asked(*asked)
+            to = self._sole_pose(*asked)
             self.left = now[0] - to[0]
             self.turn_left = rot.quat_to_rotvec(rot.multiply(rot.inverse(to[1]), now[1]))
             self.since = 0
-        place, turn = self._faded(*self._asked(*asked))
+        place, turn = self._faded(*self._sole_pose(*asked))
         self.since += 1
         place = place + np.array([0.0, 0.0, max(0.0, -self._low(place, turn))])
         pitch = float(angles(turn[None])[1][0])
@@ -93,7 +93,7 @@ class _Foot:
     def _low(self, place: Array, turn: Array) -> float:
         return float(lowest(place[None], turn[None], self.sole)[0])
 
-    def _stands(self, place: Array, turn: Array) -> bool:
+    def _is_on_ground(self, place: Array, turn: Array) -> bool:
         edges = place + rot.rotate(turn[None], self.edges)
         moved = np.zeros(2) if self.before is None else np.linalg.norm(edges - self.before, axis=-1) * self.fps
         self.before = edges
@@ -105,7 +105,7 @@ class _Foot:
                 return False
         return bool(((edges[:, 2] < height) & (moved < speed)).any())
 
-    def _asked(self, place: Array, turn: Array) -> tuple[Array, Array]:
+    def _sole_pose(self, place: Array, turn: Array) -> tuple[Array, Array]:
         return (place, turn) if self.stance is None else self._held(turn)
 
     def _held(self, turn: Array) -> tuple[Array, Array]:

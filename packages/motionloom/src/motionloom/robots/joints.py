@@ -48,7 +48,7 @@ class Parts:
     how: str
     """How they were found: by their names, by the shape of the robot, or as a map says."""
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """One line for a user: how many hinges each part has."""
         names = []
         for part in (*LEG, *ARM):

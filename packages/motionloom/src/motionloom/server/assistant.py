@@ -77,7 +77,7 @@ class Assistant:
         """What makes motion of a task's request, with its fields as arguments."""
 
         async def call(**given: Any) -> Any:
-            return await self._drawn({"task": task} | given)
+            return await self._results({"task": task} | given)
 
         known = narrowed(REQUESTS[task], most(task, self.worker.limits))
         call.__name__ = "generate_motion" if task == "generate" else task
@@ -91,7 +91,7 @@ class Assistant:
         import anyio
 
         async def export(**given: Any) -> Any:
-            return await _said(anyio.to_thread.run_sync(self._written, given))
+            return await _or_refusal(anyio.to_thread.run_sync(self._written, given))
 
         export.__doc__ = f"{inspect.getdoc(Export)} A motion is an id that another tool gave."
         export.__signature__ = _signature(specs(Export), dict[str, Any])  # type: ignore[attr-defined]
@@ -124,7 +124,7 @@ class Assistant:
 
         return SCHEMAS["goal"]()
 
-    async def _drawn(self, asked: dict[str, Any]) -> Any:
+    async def _results(self, asked: dict[str, Any]) -> Any:
         """The results of a job, as values, as text, and as a picture."""
         import anyio
 
@@ -138,7 +138,7 @@ class Assistant:
             results = [one | {"remarks": [*found["remarks"], *one["remarks"]]} for one in found["results"]]
             return results, self._picture(results)
 
-        results, picture = await _said(anyio.to_thread.run_sync(draw))
+        results, picture = await _or_refusal(anyio.to_thread.run_sync(draw))
         types = import_module("mcp.types")
         told = [types.TextContent(type="text", text=json.dumps(one, ensure_ascii=False)) for one in results]
         image = types.ImageContent(type="image", data=base64.b64encode(picture).decode(), mime_type="image/png")
@@ -173,7 +173,7 @@ def _signature(known: Mapping[str, Spec], gives: Any) -> inspect.Signature:
     return inspect.Signature(arguments, return_annotation=gives)
 
 
-async def _said(call: Any) -> Any:
+async def _or_refusal(call: Any) -> Any:
     """What a call gives; a refusal as the sentence that it is."""
     try:
         return await call

@@ -7,8 +7,9 @@ from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters
+from motionloom.io.bvh import read_bvh
 from motionloom.io.character import Character, load_character
-from motionloom.io.gltf_read import open_glb, settled
+from motionloom.io.gltf_read import open_glb, without_still_armatures
 from motionloom.io.gltf_rig import read_rig
 from motionloom.io.text import parse_json
 from motionloom.retarget import joint_map
@@ -81,11 +82,9 @@ def question(skeleton: Skeleton) -> dict[str, Any]:
 
 def _skeleton(path: Path) -> Skeleton:
     if path.suffix == ".bvh":
-        from motionloom.io.bvh import read_bvh
-
         return read_bvh(path).motion.skeleton
     file = open_glb(path)
-    nodes, joints, _ = settled(file, 0, {})
+    nodes, joints, _ = without_still_armatures(file, 0, {})
     return read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset()).skeleton
 
 

@@ -35,7 +35,7 @@ class Connection(H11Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._leave()
-        self._taken()
+        self._stop_waiting()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -62,7 +62,7 @@ class Connection(H11Protocol):
         self._watch()
 
     def resume_writing(self) -> None:
-        self._taken()
+        self._stop_waiting()
         super().resume_writing()
         if self.transport.is_closing():
             self._watch()
@@ -99,7 +99,7 @@ class Connection(H11Protocol):
         if self._stuck is None:
             self._stuck = self.loop.call_later(self._limits.stuck_seconds, self.transport.abort)
 
-    def _taken(self) -> None:
+    def _stop_waiting(self) -> None:
         if self._stuck is not None:
             self._stuck.cancel()
             self._stuck = None

@@ -150,7 +150,9 @@ class _Reader:
         timeline = timeline_from_json(self.given["timeline"], self.project, self.limits)
         found = replace(found, sampling=settled(found.values, timeline, but=self.given))
         parts = () if timeline.path is None else (("path", timeline.path),)
-        return replace(found, timeline=timeline, goal=timeline.path, parts=parts, kept=self.kept(timeline, found))
+        return replace(
+            found, timeline=timeline, goal=timeline.path, parts=parts, kept=self.kept_blocks(timeline, found)
+        )
 
     def control(self, found: JobRequest) -> JobRequest:
         if "timeline" in self.given:
@@ -188,7 +190,7 @@ class _Reader:
             raise MotionloomError(f"the two people are 0 and 1; there is no person {values.person}")
         if "goals" in self.given and kinds:
             raise MotionloomError(f"'goals' do not go with '{kinds[0]}'; a timeline has a 'path' of its own")
-        if "other_goals" in self.given and (kinds not in ([], ["timeline"]) or not self.asked()):
+        if "other_goals" in self.given and (kinds not in ([], ["timeline"]) or not self.has_goals()):
             raise MotionloomError("'other_goals' go with words or a timeline, and with goals of the first person")
         if kinds == ["timeline"]:
             found = self.compose(found)
@@ -228,7 +230,7 @@ class _Reader:
             raise MotionloomError(f"the motion has {len(motion.people)} people, counted from 0; got person {person}")
         return motion
 
-    def kept(self, timeline: Timeline, found: JobRequest) -> "tuple[Motion, list[Block]] | None":
+    def kept_blocks(self, timeline: Timeline, found: JobRequest) -> "tuple[Motion, list[Block]] | None":
         """What blocks may keep of an earlier motion; what goes on from elsewhere, or is a loop, is all sampled."""
         from motionloom.tasks.redraw import blocks_from
 
@@ -253,7 +255,7 @@ class _Reader:
         goal = read_goal(value, frames=frames, folder=self.project.motions)
         return replace(found, seconds=seconds, goal=goal, parts=self.parts(frames), other_goal=self.other_goal(frames))
 
-    def asked(self) -> bool:
+    def has_goals(self) -> bool:
         """Whether anything is asked of the person of a duet."""
         timeline = self.given.get("timeline")
         return "goals" in self.given or (isinstance(timeline, Mapping) and "path" in timeline)

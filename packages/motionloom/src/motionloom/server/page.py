@@ -26,10 +26,10 @@ def files(folder: Path = FOLDER) -> dict[str, Path]:
 def routes() -> list[BaseRoute]:
     """A route for each file, and one at / that says so where there is no page."""
     known = files()
-    return [Route(path, _given(place)) for path, place in known.items()] or [Route("/", _missing)]
+    return [Route(path, _file_response(place)) for path, place in known.items()] or [Route("/", _missing)]
 
 
-def _given(place: Path):
+def _file_response(place: Path):
     kind = mimetypes.guess_type(place.name)[0] or "application/octet-stream"
     # Only names with a hash of what is in them stay the same for ever.
     kept = "max-age=31536000, immutable" if place.parent.name == "assets" else "no-cache"

@@ -26,18 +26,17 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters
 from motionloom.io.atomic import atomic_path
+from motionloom.io.npz import load_npz, save_npz
 from motionloom.io.text import parse_json
+from motionloom.motion import Motion
 from motionloom.server.limits import Limits
 from motionloom.server.refusal import Refusal
 from motionloom.server.shelf import Shelf
-
-if TYPE_CHECKING:
-    from motionloom.motion import Motion
 
 try:
     import fcntl
@@ -57,7 +56,7 @@ class Stored:
     """A motion of the project, of one person or several in one world."""
 
     id: str
-    people: "tuple[Motion, ...]"
+    people: tuple[Motion, ...]
     about: dict[str, Any] = field(default_factory=dict)
     """Task, prompt, seed and what else is known of it; plain JSON."""
 
@@ -119,9 +118,8 @@ class Project:
 
     # -- motions
 
-    def add(self, people: "Sequence[Motion]", about: dict[str, Any]) -> Stored:
+    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> Stored:
         """Keep a motion; the oldest ones that the project does not name make room for it."""
-        from motionloom.io.npz import save_npz
 
         stored = Stored(secrets.token_hex(8), tuple(people), about)
         about = {**about, "people": len(stored.people)}
@@ -146,7 +144,6 @@ class Project:
 
     def motion(self, name: Any) -> Stored:
         """The motion of that id; raises `Refusal` 404 where there is none."""
-        from motionloom.io.npz import load_npz
 
         if not isinstance(name, str) or not ID.fullmatch(name):
             raise Refusal(404, "there is no such motion: an id is 16 hexadecimal digits, as the server gave it")
@@ -245,7 +242,7 @@ class Project:
         except FileNotFoundError:
             return None
 
-    def seen(self) -> object:
+    def saved_version(self) -> object:
         """Something that is another when the saved JSON is; None where nothing was saved."""
         try:
             about = (self.folder / "project.json").stat()

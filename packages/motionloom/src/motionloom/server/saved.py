@@ -81,7 +81,7 @@ class Saved:
     def stamp(self) -> Stamp | None:
         """Of what was saved last; None where nothing was. Raises `Refusal` 422 for what is no JSON."""
         with self._lock:
-            seen = self.project.seen()
+            seen = self.project.saved_version()
             if seen is None:
                 return None
             if self._known[0] != seen:
@@ -101,7 +101,7 @@ class Saved:
         """
         value = parse_json(data, "the project")
         with self._lock:
-            there, asked = self.stamp(), _asked(value, client)
+            there, asked = self.stamp(), _stamp_in(value, client)
             if there is None or asked.follows(there):
                 return self._follow(data, value, asked, there)
             if over is None or over != f"{there.id or ''}.{there.revision}":
@@ -194,7 +194,7 @@ def _parsed(data: bytes) -> Any:
 def _stamp_of(value: Any) -> Stamp:
     """The stamp in what was saved; what is no stamp counts as none."""
     try:
-        found = _asked(value, "")
+        found = _stamp_in(value, "")
     except MotionloomError:
         return Stamp(None)
     written = value.get("written") if isinstance(value, dict) else None
@@ -203,7 +203,7 @@ def _stamp_of(value: Any) -> Stamp:
     return found
 
 
-def _asked(value: Any, client: str) -> Stamp:
+def _stamp_in(value: Any, client: str) -> Stamp:
     """The stamp in JSON that is to be saved; raises `MotionloomError` for one that cannot be."""
     if not isinstance(value, Mapping) or "id" not in value:
         return Stamp(None)

@@ -102,7 +102,7 @@ def read_robots(models: Sequence[Path]) -> "dict[str, Robot]":
         if path.stem in found:
             raise MotionloomError(f"two robots are called {path.stem}; give their files names of their own")
         found[path.stem] = read_robot(path)
-        for note in found[path.stem].told():
+        for note in found[path.stem].remarks():
             print(f"note: {note}", file=sys.stderr)
     return found
 
@@ -120,7 +120,7 @@ class _Live:
 
     async def answer(self, websocket: WebSocket) -> None:
         """Serve one client."""
-        serve_one, sessions = await asyncio.to_thread(self._made)
+        serve_one, sessions = await asyncio.to_thread(self._open_sessions)
         await serve_one(websocket, sessions)
 
     def close(self) -> None:
@@ -129,7 +129,7 @@ class _Live:
             if self._sessions is not None:
                 self._sessions.close()
 
-    def _made(self) -> "tuple[Callable[[WebSocket, Sessions], Awaitable[None]], Sessions]":
+    def _open_sessions(self) -> "tuple[Callable[[WebSocket, Sessions], Awaitable[None]], Sessions]":
         from motionloom.live.sessions import Sessions
         from motionloom.live.socket import live_session
 

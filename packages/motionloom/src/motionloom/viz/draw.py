@@ -212,7 +212,7 @@ def paint_body(
     middles = ((depth[a] + depth[b]) / 2 + 0.08 * shape.height * inside).tolist()
     for i, (parent, child) in enumerate(shape.bones):
         if child not in shape.trunk:
-            planted = not tinted and _stands(shape, frame, parent, child)
+            planted = not tinted and _is_on_floor(shape, frame, parent, child)
             parts.append((middles[i], outer[i], inner[i], CONTACT if planted else colours[shape.sides[child]]))
     for joints, radius in ((shape.chest, 0.047), (shape.hips, 0.056)):
         if joints:
@@ -232,7 +232,7 @@ def _flat(points: list[tuple[float, float]]) -> list[float]:
     return [v for p in points for v in p]
 
 
-def _stands(shape: Figure, frame: int, parent: int, child: int) -> bool:
+def _is_on_floor(shape: Figure, frame: int, parent: int, child: int) -> bool:
     low = shape.places[frame, parent, 1] < shape.floor + 0.09 * shape.height
     return bool(low and shape.contacts[frame, child])
 

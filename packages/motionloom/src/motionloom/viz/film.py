@@ -85,36 +85,10 @@ def _is_gif(path: str | Path) -> bool:
 
 def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int], fps: float, *, ffmpeg: str) -> None:
     """Pipe raw pictures into ffmpeg: an argument list, no shell, an absolute path."""
-    command = [
-        ffmpeg,
-        "-y",
-        "-loglevel",
-        "error",
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "rgb24",
-        "-s",
-        f"{size[0]}x{size[1]}",
-        "-r",
-        f"{fps:.6f}",
-        "-i",
-        "-",
-        "-an",
-        "-c:v",
-        "libx264",
-        "-preset",
-        "veryfast",
-        "-crf",
-        "20",
-        "-pix_fmt",
-        "yuv420p",
-        "-movflags",
-        "+faststart",
-        "-f",
-        "mp4",
-        f"file:{path.absolute()}",
-    ]
+    read = f"-f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {fps:.6f} -i - -an"
+    written = "-c:v libx264 -preset veryfast -crf 20 -pix_fmt yuv420p -movflags +faststart -f mp4"
+    options = f"-y -loglevel error {read} {written}".split()
+    command = [ffmpeg, *options, f"file:{path.absolute()}"]
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log, start_new_session=True

@@ -63,6 +63,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
 
     for made in (predict, predict_pieces, switch):
         monkeypatch.setattr(task, made.__name__, made)
+    monkeypatch.setattr("motionloom.cli.predict.predict_pieces", predict_pieces)  # opened at its top
     return seen
 
 

@@ -118,9 +118,7 @@ def test_what_cannot_be_finished_leaves_nothing(weights, asked, monkeypatch, pro
 
 
 def test_more_than_memory_holds_is_refused(weights, asked, monkeypatch, capsys):
-    from motionloom import motion
-
-    monkeypatch.setattr(motion, "MAX_POSES", 9_000)  # 90 frames of 22 joints are 1,980 each
+    monkeypatch.setattr("motionloom.cli.predict.MAX_POSES", 9_000)  # 90 frames of 22 joints are 1,980 each
     assert run(weights, "predict", "past.bvh", "--count", "5", "--out", "a.npz") == 2
     assert "5 motions of" in capsys.readouterr().err
     assert run(weights, "predict", "past.bvh", "--count", "2", "--out", "a.npz") == 0

@@ -25,13 +25,13 @@ class Clock:
     fps: float
 
     @property
-    def drawn(self) -> int:
+    def sampled_frames(self) -> int:
         """Frames at 20 per second that reach from the request's first to its last."""
         return max(int(np.ceil((self.frames - 1) / self.fps * FPS - 1e-6)) + 1, 4)
 
     def frame(self, asked: int) -> int:
         """The drawn frame nearest to one of the request's."""
-        return min(round(asked / self.fps * FPS), self.drawn - 1)
+        return min(round(asked / self.fps * FPS), self.sampled_frames - 1)
 
     def resampled(self, motion: Motion) -> Motion:
         """A drawn motion at the request's frames."""
@@ -66,7 +66,7 @@ class Asked:
 def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Asked:
     """Constraints of `motionmcp.schemas`; raises `MotionloomError` for what contradicts itself or cannot be reached."""
     size, nearest = rig.size, {joint: name for name, joint in rig.joints().items()}
-    goal, floating, ground, notes = Goal.nothing(clock.drawn), [], [], []
+    goal, floating, ground, notes = Goal.nothing(clock.sampled_frames), [], [], []
     for one in constraints:
         if one.type == "root_path":
             goal = merged(goal, _path(one, size, clock))
@@ -77,7 +77,7 @@ def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Aske
         elif one.type == "pose_keyframe":
             pose = _pose(one, rig, size, clock)
             if pose.placed:
-                goal = merged(goal, as_goal(pose, clock.drawn))
+                goal = merged(goal, as_goal(pose, clock.sampled_frames))
             else:
                 floating.append(pose)
         else:
@@ -97,7 +97,7 @@ def _path(one: Any, size: float, clock: Clock) -> Goal:
         facing = np.degrees(np.unwrap(np.asarray(turns, dtype=np.float64))).tolist()
         facing = facing[0] if len(facing) == 1 else facing
     times = [frame / FPS for frame in frames]
-    return root_path(np.asarray(points, dtype=np.float64) / size, times, frames=clock.drawn, facing=facing)
+    return root_path(np.asarray(points, dtype=np.float64) / size, times, frames=clock.sampled_frames, facing=facing)
 
 
 def _unique(frames: Sequence[int], values: Sequence[Any]) -> tuple[list[int], list[Any]]:
@@ -112,7 +112,7 @@ def _target(one: Any, nearest: dict[str, str], size: float, clock: Clock) -> Goa
             f"the joint {one.joint!r} is none of the 22 that can be asked to be somewhere; on this skeleton they are "
             f"{', '.join(sorted(nearest))}"
         )
-    joint, goal = SMPL22.index(nearest[one.joint]), Goal.nothing(clock.drawn)
+    joint, goal = SMPL22.index(nearest[one.joint]), Goal.nothing(clock.sampled_frames)
     for frame, place in zip(one.frames, one.positions, strict=True):
         at = clock.frame(frame)
         goal.positions[at, joint], goal.asked[at, joint] = np.asarray(place, dtype=np.float64) / size, True

@@ -130,7 +130,7 @@ def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, 
         motion = _bent(motion, asked)
     else:
         segments = _segments(request, clock)
-        motion = _drawn(sampler, segments, asked, seed)
+        motion = _generated(sampler, segments, asked, seed)
     if request.options and request.options.loop:
         motion = _looped(sampler, motion, seed)
     return motion if asked.ground is None else on_ground(motion, asked.ground)
@@ -149,7 +149,7 @@ def _sampling(request: Any) -> Sampling:
 def _segments(request: Any, clock: Clock) -> list[Segment]:
     """Segments at 20 frames per second whose frames add up to those that are drawn."""
     listed = request.segments or [None]
-    ends = [clock.drawn] if request.segments == [] else _ends(request, clock)
+    ends = [clock.sampled_frames] if request.segments == [] else _ends(request, clock)
     frames = np.diff([0, *ends]).tolist()
     wanted = TRANSITION
     if request.options is not None and "transition_frames" in request.options.model_fields_set:
@@ -165,10 +165,10 @@ def _segments(request: Any, clock: Clock) -> list[Segment]:
 
 def _ends(request: Any, clock: Clock) -> list[int]:
     ends = np.cumsum([segment.duration_frames for segment in request.segments])
-    return [*(clock.frame(int(end)) for end in ends[:-1]), clock.drawn]
+    return [*(clock.frame(int(end)) for end in ends[:-1]), clock.sampled_frames]
 
 
-def _drawn(sampler: _Sampler, segments: list[Segment], asked: Asked, seed: int) -> Motion:
+def _generated(sampler: _Sampler, segments: list[Segment], asked: Asked, seed: int) -> Motion:
     """The segments, steered to what is asked of them; poses without a place are asked where a first sample is."""
     goal = asked.goal
     if asked.floating:
