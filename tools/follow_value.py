@@ -5,9 +5,10 @@ python tools/follow_value.py [past | partner | character | goal] [--list]
 past: what `predict` goes on from; partner: the motion that `react` answers; character: a file that `export` writes with
 a motion in it; goal: what `control` keeps to. Counted are different functions of the package that are handed the value:
 those called with arrays or motions by a function that has it, beginning with the function that is given it; also where
-what they are handed is made of the value and of what was sampled. What `retarget`, `kinematics`, `rotations` and
-`skeleton` do inside is not followed, only the entries to them are counted; a skeleton alone is no value; methods of
-`Motion` and functions within functions do not count, nor does a network's own loop. Untrained networks sample one step.
+what they are handed is made of the value and of what was sampled. Arithmetic (`INSIDE`) is not followed: of it, the
+functions that are called from elsewhere are counted. A skeleton and weights alone are no value. Not counted are methods
+of the forms that all tasks share (`FORMS`), functions within functions, and a network's own loop. Untrained networks
+sample one step.
 """
 
 import dataclasses
@@ -23,12 +24,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "packages/motionloom"))
 
-from motionloom import Skeleton, load, predict
+from motionloom import Predictor, Prior, Skeleton, load, predict
+from motionloom.diffusion import Schedule
 from motionloom.goals.goal_file import read_goal
 from motionloom.io.character import load_character
 from motionloom.retarget import retarget
+from motionloom.runtime.pair import PairSession
+from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.control import control
 from motionloom.tasks.duet import react
+from motionloom.weights.pair import PairBlock
 from tests.io.rigged import Hero
 from tests.recorded import tiny
 from tests.tasks.small_predictor import small_predictor
@@ -37,8 +42,26 @@ from tests.tasks.two_people import block
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = str(ROOT / "packages" / "motionloom" / "src" / "motionloom")
 CLIP = ROOT / "examples" / "clips" / "walk.bvh"
-INSIDE = ("retarget/", "kinematics/", "rotations.py", "skeleton.py")
-"""Where nothing is followed."""
+INSIDE = (
+    "arrays.py",
+    "blending.py",
+    "rotations.py",
+    "ground.py",
+    "skeleton.py",
+    "diffusion/",
+    "edits/",
+    "features/",
+    "kinematics/",
+    "retarget/",
+    "runtime/",
+    "tasks/splice.py",
+    "tasks/text.py: finish",
+)
+"""Arithmetic, where nothing is followed: functions of numbers, places and bodies that know of no task. `edits` change
+denoised estimates, `runtime` has the numbers of networks, `splice` and `finish` make bodies of places and features."""
+FORMS = ("GroundPose", "Motion", "PairMotion", "PlacedMotion")
+"""Frozen values that every task shares: calling their methods hands nothing on. They are arithmetic too."""
+WEIGHTS = (PairBlock, PairSession, Predictor, Prior, PriorSession, Schedule)
 LOOPS = ("complete", "run", "sample", "denoising")
 """Networks' own loops."""
 
@@ -80,7 +103,7 @@ def arrays(value: object, depth: int = 3) -> list[np.ndarray]:
     """The arrays in a value, its fields and its elements."""
     if isinstance(value, np.ndarray):
         return [value]
-    if isinstance(value, Skeleton):
+    if isinstance(value, (Skeleton, *WEIGHTS)):
         return []
     if depth and dataclasses.is_dataclass(value) and not isinstance(value, type):
         parts = [getattr(value, field.name, None) for field in dataclasses.fields(value)]
@@ -105,15 +128,16 @@ def follow(call: Callable[[], None], begin: str) -> tuple[Counter[tuple[str, str
         if event == "return":
             having.pop()
             return
-        file = code.co_filename[len(SOURCE) + 1 :]
+        file, form = code.co_filename[len(SOURCE) + 1 :], code.co_qualname.partition(".")[0] in FORMS
         names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount + bool(code.co_flags & inspect.CO_VARARGS)]
         plain = "<" not in code.co_qualname
         first = not any(had for had, _ in having)
         handed = not plain or any(arrays(frame.f_locals.get(name)) for name in names) or (first and file == begin)
         handed = handed and code.co_name not in LOOPS and (file == begin if first else having[-1][0])
         back += handed and plain and file == begin and bool(having) and having[-1][1] != begin and not first
-        having.append((handed and not file.startswith(INSIDE), file))
-        if handed and plain and file != "motion.py":
+        inside = form or f"{file}: {code.co_name}".startswith(INSIDE)
+        having.append((handed and not inside, file))
+        if handed and plain and not form and file != "motion.py":
             found[file, code.co_qualname] += 1
 
     sys.setprofile(entered)

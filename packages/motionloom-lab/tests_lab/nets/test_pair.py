@@ -234,7 +234,6 @@ def test_states_are_put_together_and_taken_apart():
     plain = runtime_pair.join(places.numpy(), motion.numpy())  # the same without PyTorch
     np.testing.assert_array_equal(plain, state)
     np.testing.assert_array_equal(runtime_pair.part(plain)[0], places)
-    np.testing.assert_array_equal(runtime_pair.other(plain), other(state))
     for shape in ((3, 9, 263), (2, 1, 263)):
         net = net_of("published")
         with pytest.raises(MotionloomError, match="even number"):

@@ -10,6 +10,7 @@ import pytest
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
+from motionloom.features.pair import PairMotion
 from motionloom.runtime.prior_condition import condition
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.container import weights_digest
@@ -117,9 +118,9 @@ class Oracle:
         encoded = [two.encode(crop) for crop in crops.positions]
         self.features = np.stack([one.features for one in encoded])
 
-    def __call__(self, prior, net, prompts, frames, **how) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, prior, net, prompts, frames, **how) -> PairMotion:
         self.asked.append({"prompts": prompts, "frames": frames, **how})
-        return self.features[: len(prompts) // 2], np.zeros((len(prompts) // 2, 2, 4))
+        return PairMotion(self.features[: len(prompts) // 2], np.zeros((len(prompts) // 2, 2, 4)))
 
 
 @pytest.mark.parametrize(("given", "slots"), [("past", 21), ("tool", 21), ("published", 20)])

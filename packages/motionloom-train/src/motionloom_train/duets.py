@@ -50,7 +50,7 @@ class Duets:
         self.lengths = np.array([pair.features.shape[1] for pair in self.encoded])
 
     def _encode(self, pair: Pair) -> _Encoded:
-        features, ground, _ = encode(pair.positions)
+        features, ground = encode(pair.positions)
         features, ground = torch.from_numpy(features).double(), torch.from_numpy(ground)
         ways = compose(ground[:, None], along(features))
         known = {text: number for number, text in enumerate(self.texts)}

@@ -63,6 +63,11 @@ class GroundPose:
         x, _, z = place.from_world(np.array([self.x, 0.0, self.z]))
         return GroundPose(float(x), float(z), self.facing - place.facing)
 
+    def apart(self, other: "GroundPose") -> tuple[float, float]:
+        """Metres and radians, 0 to pi, from one to the other."""
+        turn = (self.facing - other.facing + np.pi) % (2 * np.pi) - np.pi
+        return float(np.hypot(self.x - other.x, self.z - other.z)), abs(turn)
+
     def inverse(self) -> "GroundPose":
         """The world's origin as seen from here."""
         return GroundPose().seen_from(self)

@@ -147,6 +147,12 @@ class Motion:
         moved = None if self.translations is None else lerp(self.translations)
         return replace(self, fps=float(fps), root=lerp(self.root), rotations=turned, translations=moved)
 
+    def placed(self, place: GroundPose) -> "Motion":
+        """A motion that starts at the origin facing +Z, started at ``place`` instead."""
+        rotations = self.rotations.copy()
+        rotations[:, 0] = rot.multiply(rot.rotvec_to_quat(np.array([0.0, place.facing, 0.0])), rotations[:, 0])
+        return replace(self, root=place.to_world(self.root), rotations=rot.unroll(rotations))
+
     def scaled(self, size: float) -> "Motion":
         """The same motion of a body, and over a way, ``size`` times as large."""
         return replace(

@@ -5,8 +5,8 @@ import pytest
 
 from motionloom.edits.apart import kept_apart, shift_apart
 from motionloom.edits.bodies import Bodies
-from motionloom.edits.pair_motion import PairMotion
 from motionloom.features import pair as two
+from motionloom.features.pair import PairMotion
 from motionloom.io import load
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, gaps
 from motionloom.retarget import to_smpl22
@@ -20,7 +20,7 @@ def beside(x: float, z: float) -> PairMotion:
     """Somebody who walks, and the same again at a distance (metres)."""
     own = to_smpl22(load(CLIP)).at(np.linspace(0, len(load(CLIP)) - 1, 101), 20.0).positions()  # slowly
     encoded = two.encode(np.stack([own, own + np.array([x, 0.0, z])]))
-    return PairMotion(encoded.features.astype(np.float64), encoded.poses)
+    return encoded._replace(features=encoded.features.astype(np.float64))
 
 
 def inside(pair: PairMotion) -> np.ndarray:

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from motionloom.edits.meeting import Meeting, arms_out, met
-from motionloom.edits.pair_motion import PairMotion
 from motionloom.features import pair as two
+from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import LEFT, RIGHT, read_contact
 from motionloom.ground import GroundPose, relative
 from motionloom.kinematics.capsules import overlap
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.control import moved
 
 HALVES = np.array([0.5, 0.5])
 
@@ -33,12 +32,12 @@ def meeting(words: str) -> Meeting:
 
 
 def couple(apart: float, turn: float = np.pi) -> list[Motion]:
-    return [standing(), moved(standing(), GroundPose(0.0, apart, turn))]
+    return [standing(), standing().placed(GroundPose(0.0, apart, turn))]
 
 
 def features(people: list[Motion]) -> PairMotion:
     encoded = two.encode(np.stack([person.positions() for person in people]))
-    return PairMotion(encoded.features.astype(np.float64), encoded.poses)
+    return encoded._replace(features=encoded.features.astype(np.float64))
 
 
 @pytest.mark.parametrize(("apart", "turn"), [(2.0, 0.3), (0.3, np.pi), (1.0, -2.0)])
@@ -99,7 +98,7 @@ def test_a_hug_has_arms_around_and_no_heads_in_each_other() -> None:
     pair = features(people)
     one.look(pair.places())
     near = one.near(pair, HALVES)
-    people = [moved(standing(), GroundPose.of_numbers(pose)) for pose in near.poses]
+    people = [standing().placed(GroundPose.of_numbers(pose)) for pose in near.poses]
     first, second = (person.positions()[one.frame] for person in met(people, one, (None, None)))
     behind = second[[LEFT, RIGHT]] - first[0]
     ahead = np.array(

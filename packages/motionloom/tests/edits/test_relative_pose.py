@@ -9,10 +9,11 @@ import pytest
 from motionloom.edits import relative_pose as duet_places
 from motionloom.edits.relative_pose import Places, relative_pose_guidance
 from motionloom.features import pair as two
-from motionloom.features.pair import PUBLISHED_CODE
+from motionloom.features.pair import PUBLISHED_CODE, PairMotion
 from motionloom.ground import relative
 from motionloom.runtime.pair import PairSession, join
-from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_features, pair_noise
+from motionloom.tasks.pair import PairEdits, generate_pair, pair_features, pair_noise
+from motionloom.tasks.people import known_state
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.noise import normal
@@ -172,7 +173,7 @@ def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock
 
 def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
     net, first = block.net(prior), drifting(prior)[:, :20]
-    observed = known_state(prior, net, first, BESIDE, 90)
+    observed = known_state(net, PairMotion(first[None], BESIDE[None]), 90)
     made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], edits=PairEdits(observed), steps=2)
     np.testing.assert_allclose(made[0, :, :20], first, rtol=0, atol=1e-5)
 

@@ -51,7 +51,7 @@ def test_two_people_come_back_to_a_hundredth_of_a_millimetre():
     world = people()
     made = pair.encode(world)
     back = pair.decode(made.features.astype(np.float64), made.poses)
-    back[..., 1] += made.floors[:, None, None]
+    back[..., 1] += pair.floors(world)[:, None, None]
     assert np.abs(back - world[:, :-1]).max() < 1e-5
     between = np.linalg.norm(world[0, :-1, :, None] - world[1, :-1, None], axis=-1)
     assert np.abs(np.linalg.norm(back[0, :, :, None] - back[1, :, None], axis=-1) - between).max() < 1e-5
@@ -76,22 +76,21 @@ def test_exchanged_people_have_exchanged_features_stands_and_numbers():
 @pytest.mark.parametrize("start", [1, 17, 30])
 def test_a_crop_has_the_stands_of_its_own_first_frame(start):
     made = pair.encode(people(7))
-    features = made.features.astype(np.float64)
-    whole = pair.decode(features, made.poses)
-    cut = pair.later(features, made.poses, start)
-    np.testing.assert_allclose(pair.decode(features[:, start:], cut), whole[:, start:], atol=1e-9)
+    made = made._replace(features=made.features.astype(np.float64))
+    features, whole = made.features, made.places()
+    np.testing.assert_allclose(made.crop(start, 40).places(), whole[:, start:40], atol=1e-9)
     assert np.abs(pair.decode(features[:, start:], made.poses) - whole[:, start:]).max() > 0.02  # the published bug
 
 
 def test_the_root_of_a_crop_stands_where_its_features_begin():
     made = pair.encode(people(8))
-    cut = pair.later(made.features.astype(np.float64), made.poses, 20)
+    cut = made._replace(features=made.features.astype(np.float64)).crop(20, 40).poses
     np.testing.assert_allclose(cut[:, 2:], people(8)[:, 20, 0, [0, 2]], atol=1e-5)
 
 
 def test_frame_zero_is_later_by_nothing():
     made = pair.encode(people(9))
-    np.testing.assert_allclose(pair.later(made.features.astype(np.float64), made.poses, 0), made.poses, atol=1e-12)
+    np.testing.assert_allclose(made.crop(0, 9).poses, made.poses, atol=1e-12)
 
 
 def test_mirrored_stands_belong_to_mirrored_features():

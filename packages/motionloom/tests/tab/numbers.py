@@ -19,7 +19,7 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED, Sampling
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import as_rows
-from motionloom.tasks.control import moved, steered_features
+from motionloom.tasks.control import steered_features
 from motionloom.tasks.long import Track, compose, in_world, long_features
 from motionloom.tasks.supported import supported
 from motionloom.tasks.text import sample_features, to_motion
@@ -152,7 +152,7 @@ def _paths(prior: Prior, found: Numbers) -> None:
     place = start_of(goal)
     [features] = steered_features(prior, ["a person walks"], goal.seen_from(place), seeds=[4])
     found.add("path.features", features)
-    found.motion("path", moved(to_motion(features.astype(np.float64), prior.fps), place))
+    found.motion("path", to_motion(features.astype(np.float64), prior.fps).placed(place))
     segments = [Segment(text, seconds) for text, seconds in CHAINS[0]]
     frames = [round(segment.seconds * prior.fps) for segment in segments]
     track = Track.along(root_path(PATH, frames=sum(frames)), prior.fps)

@@ -7,6 +7,7 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
+from motionloom.features.pair import PairMotion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
@@ -62,7 +63,7 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
         uniform = np.stack([person_at_20(motion) for motion in (given, partner)])
         encoded = two.encode(uniform)
         elsewhere = two.compose(np.array([0.0, 1.0, 7.0, -3.0]), encoded.poses)
-        return np.asarray(encoded.features)[None], np.asarray(elsewhere)[None]
+        return PairMotion.stack([encoded._replace(poses=elsewhere)])
 
     monkeypatch.setattr(tasks, "pair_features", true)
     [(first, second)] = react(prior, block, given, "two people walk", foot_lock=False)

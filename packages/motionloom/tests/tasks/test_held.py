@@ -6,6 +6,7 @@ import pytest
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.goals.hold import FixedJoints, FixedPart
+from motionloom.ground import turned
 from motionloom.motion import Motion
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
@@ -60,8 +61,7 @@ def _on_rig(motion: Motion) -> np.ndarray:
 
 def test_the_way_of_an_aligned_source_is_taken_and_goes_on_where_the_past_ends() -> None:
     made = future(held("root"))
-    turn = rot.multiply(standing(PAST, 29)[1], rot.inverse(standing(SOURCE, 0)[1]))
-    steps = rot.rotate(turn, np.diff(SOURCE.root[:24], axis=0))
+    steps = turned(np.diff(SOURCE.root[:24], axis=0), standing(PAST, 29).facing - standing(SOURCE, 0).facing)
     np.testing.assert_allclose(np.diff(made.root, axis=0), steps, atol=1e-9)
     np.testing.assert_allclose(made.root[:, 1], SOURCE.root[:24, 1], atol=1e-12)
     first = (made.root[0] - PAST.root[-1])[[0, 2]]

@@ -9,13 +9,13 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
+from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
-from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.long import Past, compose, compose_takes, decoded, long_features
+from motionloom.tasks.long import Past, compose, compose_takes, long_features
 from motionloom.tasks.splice import carried
 from motionloom.tasks.text import sample_features
 from motionloom.tasks.watching import Denoised, watching
@@ -189,8 +189,7 @@ def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) 
     first = features(prior, [replace(segments[1], text=TURN)], past=Past.of(clip))[0].astype(np.float64)
     np.testing.assert_allclose(humanml.decode_positions(first)[20, 0, ::2], (0.3, 0.5), atol=0.01)
     pieces = features(prior, segments, past=Past.of(clip))
-    place = Past.of(clip).end
-    _, place = decoded(pieces[0].astype(np.float64), place)
+    place = PlacedMotion(pieces[0], Past.of(clip).end).end
     seen = humanml.decode_positions(pieces[1].astype(np.float64))
     np.testing.assert_allclose(seen[20, 0, ::2], (0.3, 0.5), atol=0.1)
     made = whole(prior, segments, start=clip, foot_lock=False)
@@ -226,16 +225,7 @@ def test_a_motion_goes_on_where_a_clip_ends(prior: Prior, turn: float) -> None:
     assert abs(float(np.diff(heading(np.stack([old[-1], new[0]])))[0])) < 0.05
 
 
-def test_the_place_behind_features_is_where_the_next_ones_begin() -> None:
-    """Features of a person's motion cut in two and strung together are the motion."""
-    places = person(4.0).positions()
-    x, _, z = places[0, 0]
-    begin = GroundPose(float(x), float(z), float(heading(places[:1])[0]))
-    numbers = humanml.encode(begin.from_world(places)).astype(np.float64)
-    first, middle = decoded(numbers[:33], begin)
-    second, end = decoded(numbers[33:], middle)
-    np.testing.assert_allclose(np.concatenate([first, second]), places[:-1], atol=1e-4)
-    np.testing.assert_allclose([end.x, end.z], places[-1, 0, ::2], atol=1e-4)
+def test_a_second_of_a_past_is_seen() -> None:
     assert len(Past.of(person(4.0)).known) == 20
 
 

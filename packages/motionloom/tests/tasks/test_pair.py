@@ -10,7 +10,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
-from motionloom.features.pair import one_world
+from motionloom.features.pair import PairMotion, one_world
 from motionloom.goals.goal import Goal
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
@@ -19,14 +19,13 @@ from motionloom.runtime.pair import PairSession
 from motionloom.tasks import pair
 from motionloom.tasks.duet import react
 from motionloom.tasks.pair import (
-    Ground,
     PairEdits,
     complete_pair,
     generate_pair,
-    known_state,
     pair_features,
     person_seeds,
 )
+from motionloom.tasks.people import Pasts, known_state
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import finish, sample_features
 from motionloom.weights.pair import PairBlock
@@ -59,7 +58,7 @@ def both_known(prior: Prior, block: PairBlock, count: int = 5) -> Observed:
     """A state whose first frames and D are known."""
     first = normal((2, count, 263), 3) * prior.std + prior.mean
     stands = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    return known_state(prior, block.net(prior), first, stands, FRAMES)
+    return known_state(block.net(prior), PairMotion(first[None], stands[None]), FRAMES)
 
 
 @pytest.mark.parametrize("known", [False, True], ids=["free", "prefix"])
@@ -222,11 +221,11 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
 
 
 def test_one_ground_for_two_bodies_is_undone(prior: Prior) -> None:
-    ground = Ground.of(walkers(1.2))
-    alone = [to_smpl22(motion).positions() for motion in ground.motions]
-    common = one_world(alone, ground.legs)
+    pasts = Pasts.of(walkers(1.2))
+    alone = [to_smpl22(motion).positions() for motion in pasts.motions]
+    common = one_world(alone, pasts.legs)
     for i in (0, 1):
-        np.testing.assert_allclose(ground.own(i, common[i]), alone[i], atol=1e-9)
+        np.testing.assert_allclose(pasts.own(i, common[i]), alone[i], atol=1e-9)
     assert np.abs(common[0] - alone[0]).max() > 0.01
 
 
@@ -251,13 +250,12 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
     past = tuple(motion.frames(0, count) for motion in whole)
 
     def true(prior, net, said, frames, **_):
-        legs = Ground.of(whole).legs
-        ground = Ground.of((past[0], past[1]))
-        seen = ground.encoded().features.shape[1]
+        legs = Pasts.of(whole).legs
+        seen = Pasts.of((past[0], past[1])).known.features.shape[1]
         at = count - 1 + (np.arange(frames + 1) - (seen - 1)) / 20 * whole[0].fps
         uniform = one_world([to_smpl22(motion).positions() for motion in whole], legs)
         encoded = two.encode(np.stack([positions_at(person, at) for person in uniform]))
-        return np.asarray(encoded.features)[None], np.asarray(encoded.poses)[None]
+        return PairMotion.stack([encoded])
 
     monkeypatch.setattr(pair, "pair_features", true)
     [duet] = complete_pair(prior, block, (past[0], past[1]), seconds=0.5)

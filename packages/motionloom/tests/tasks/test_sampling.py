@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from motionloom.diffusion import Denoiser, State
 from motionloom.errors import MotionloomError
 from motionloom.requests.sampling import PairSampling, PredictionSampling, Sampling
+from motionloom.tasks.sampling import Batch, Observed, Rows, sample
+from tests.recorded import tiny
 
 
 @pytest.mark.parametrize(
@@ -56,3 +59,26 @@ def test_seeds_of_motions_follow_each_other() -> None:
     assert Sampling(seed=5).seeds(3) == [5, 6, 7]
     with pytest.raises(MotionloomError, match="one person has one seed"):
         Sampling(seed=(1, 2)).seeds(1)
+
+
+@pytest.mark.parametrize("slots", [0, 1])
+def test_settled_states_are_smoothed_hold_what_is_observed_and_are_edited_once_more(slots: int) -> None:
+    prior, levels = tiny.prior(), []
+
+    def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
+        def edited(state: State, level: int) -> State:
+            levels.append(level)
+            return denoise(state, level) + (0 if level else 1)
+
+        return edited
+
+    mask = np.zeros((1, 12, len(prior.mean)), np.bool_)
+    mask[:, :3] = True
+    given = Observed(np.full(mask.shape, 0.5, np.float32), mask)
+    rows, how = Rows(["a person walks"], [12], [3], slots=slots), Sampling(steps=3)
+    [(_, plain)] = sample(prior, rows, how, observed=given)
+    [(_, made)] = sample(prior, rows, how, observed=given, edits=[edit], settled=True)
+    smoothed = np.concatenate([plain[:slots], prior.smoothed(plain[slots:])])
+    np.testing.assert_allclose(made, np.where(mask[0], 0.5, smoothed) + 1, atol=1e-5)
+    assert np.abs(smoothed - plain).max() > 1e-3
+    assert (levels[-1], all(levels[:-1]), len(levels)) == (0, True, 4)

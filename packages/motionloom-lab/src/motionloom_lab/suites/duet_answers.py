@@ -11,9 +11,8 @@ from motionloom.features import pair as two
 from motionloom.ground import GroundPose
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
-from motionloom.tasks.control import moved
 from motionloom.tasks.duet import react
-from motionloom.tasks.pair import Duet
+from motionloom.tasks.people import Duet
 from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -135,7 +134,7 @@ def alone(prior: Prior, given: Windows, how: DuetSettings) -> Make:
         for number, window in enumerate(given.draw(caption, count, seed)):
             (partner,) = generate(prior, caption, seconds=how.seconds, seed=own_seed(seed, number), **how.drawing)
             begins = GroundPose.of_numbers(two.encode(window).poses[1])
-            made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))
+            made.append((motion_from_positions(window[0], mp.FPS), partner.placed(begins)))
         return made
 
     return make

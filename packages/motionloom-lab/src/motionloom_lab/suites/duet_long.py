@@ -10,10 +10,9 @@ from pathlib import Path
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
-from motionloom.tasks.control import moved
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose
-from motionloom.tasks.pair import Duet
+from motionloom.tasks.people import Duet
 from motionloom.tasks.splice import concatenated
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
@@ -101,7 +100,7 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: Lon
         made = []
         for number, poses in enumerate(begun(count, seed)):
             first, second = (
-                moved(one(caption, own_seed(seed, 2 * number + i)), GroundPose.of_numbers(pose))
+                one(caption, own_seed(seed, 2 * number + i)).placed(GroundPose.of_numbers(pose))
                 for i, pose in enumerate(poses)
             )
             made.append((first, second))

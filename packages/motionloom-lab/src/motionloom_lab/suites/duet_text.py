@@ -15,11 +15,11 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
-from motionloom.ground import GroundPose
+from motionloom.features.pair import PairMotion
 from motionloom.kinematics.physics import Array
-from motionloom.tasks.control import moved
-from motionloom.tasks.pair import Duet, PairEdits, generate_pair, known_state, pair_features, person_seeds, stacked
-from motionloom.tasks.text import GUIDANCE, STEPS, finish, frames_in
+from motionloom.tasks.pair import PairEdits, generate_pair, pair_features, person_seeds
+from motionloom.tasks.people import Duet, finish_person, known_state
+from motionloom.tasks.text import GUIDANCE, STEPS, frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
@@ -154,26 +154,22 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: DuetSettings) -> Make:
     frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        nothing = np.zeros((2, 0, len(prior.mean)), np.float32)
-        known = [known_state(prior, net, nothing, poses, frames) for poses in begun(count, seed)]
-        features, poses = pair_features(
+        nothing = np.zeros((count, 2, 0, len(prior.mean)), np.float32)
+        known = PairMotion(nothing, np.stack(begun(count, seed)))
+        sampled = pair_features(
             prior,
             net,
             [caption] * (2 * count),
             frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-            edits=PairEdits(stacked(known)),
+            edits=PairEdits(known_state(net, known, frames)),
             guidance=how.guidance,
             steps=how.steps,
         )
-        made = []
-        for numbers, standing in zip(features, poses.astype(np.float64), strict=True):
-            first, second = (
-                moved(finish(prior, f, foot_lock=how.clean), GroundPose.of_numbers(s))
-                for f, s in zip(numbers, standing, strict=True)
-            )
-            made.append((first, second))
-        return made
+        return [
+            (finish_person(prior, one, 0, foot_lock=how.clean), finish_person(prior, one, 1, foot_lock=how.clean))
+            for one in sampled.each()
+        ]
 
     return make
 

@@ -13,11 +13,13 @@ from torch import nn
 
 from motionloom.diffusion import row_seed
 from motionloom.features import pair as two
+from motionloom.features.pair import PairMotion
 from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.runtime.pair import PairSession
 from motionloom.tasks.long import Past
-from motionloom.tasks.pair import PairEdits, known_state, pair_features, person_seeds, stacked
+from motionloom.tasks.pair import PairEdits, pair_features, person_seeds
+from motionloom.tasks.people import known_state
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, save_prior
 from motionloom_lab.metrics.pair import PREFIX
@@ -44,7 +46,7 @@ class Crops:
 
 
 Way = Callable[[Crops, int], Array]
-Features = Callable[..., tuple[np.ndarray, np.ndarray]]
+Features = Callable[..., PairMotion]
 """`tasks.pair.pair_features`, or what takes its place."""
 FRAMES = 80
 """Frames of a completion, the given ones included."""
@@ -112,22 +114,26 @@ def sampled(
     """
 
     def way(crops: Crops, sample: int) -> Array:
-        known = [two.encode(visible_part(crop, given)) for crop in crops.positions]
-        states = [known_state(prior, net, one.features, one.poses, FRAMES) for one in known]
-        people = [person for one in known for person in one.features]
+        worlds = [visible_part(crop, given) for crop in crops.positions]
+        known = PairMotion.stack([two.encode(world) for world in worlds])
+        people = [person for one in known.features for person in one]
         leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]
-        features, _ = make(
+        sampled = make(
             prior,
             net,
             [prompt] * len(people),
             FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
-            edits=PairEdits(stacked(states), leaving if given == "past" else None, frozen=[False] * len(people)),
+            edits=PairEdits(
+                known_state(net, known, FRAMES), leaving if given == "past" else None, frozen=[False] * len(people)
+            ),
             guidance=guidance,
             steps=steps,
         )
-        poses, floors = np.stack([one.poses for one in known]), np.stack([one.floors for one in known])
-        return two.decode(features.astype(np.float64), poses) + floors[..., None, None, None] * _UP
+        floors = np.stack([two.floors(world) for world in worlds])
+        return (
+            PairMotion(sampled.features.astype(np.float64), known.poses).places() + floors[..., None, None, None] * _UP
+        )
 
     return way
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
-from motionloom.edits.pair_motion import PairMotion
+from motionloom.features.pair import PairMotion
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, gaps
 from motionloom.kinematics.physics import J
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from motionloom.edits.apart import kept_apart
 from motionloom.edits.meeting import Meeting
-from motionloom.edits.pair_motion import PairMotion
 from motionloom.edits.steering import toward
-from motionloom.features.pair import PlaceCode
+from motionloom.features.pair import PairMotion, PlaceCode
 from motionloom.ground import GroundPose
+from motionloom.runtime.pair import join, part
 from motionloom.weights.prior import Prior
 
 SURE = 0.8
@@ -42,11 +42,16 @@ class Bodies:
         return Bodies(free, bends, still, meeting if any(bends) else None)
 
     def edit(
-        self, prior: Prior, code: PlaceCode, motion: np.ndarray, places: np.ndarray, poses: np.ndarray, *, level: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A denoised motion (2, frames, 263), standardised, its D (2, 4) and ground poses (2, 4), changed."""
+        self, prior: Prior, code: PlaceCode, state: np.ndarray, level: int, begin: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """A denoised state (2, 1 + frames, 263), and the ground poses (2, 4) at its first frame, changed.
+
+        begin: the ground poses before; None: those that the state's own D says.
+        """
+        places, motion = part(state)
+        poses = code.decode(places) if begin is None else begin
         if prior.schedule.at(level)[1] > SURE:
-            return motion, places, poses
+            return state, poses
         free = np.array(self.free, dtype=np.float64)
         shares = free / free.sum().clip(1.0)
         pair = PairMotion(motion.astype(np.float64) * prior.spread + prior.mean, np.asarray(poses, dtype=np.float64))
@@ -57,10 +62,10 @@ class Bodies:
             close = self.meeting.close(motion.shape[1])
         made = kept_apart(made, shares, still=self.still, close=close)
         if made is pair:
-            return motion, places, poses
+            return state, poses
         # the difference: what is not sure yet is near 0, and must not become sure by this
         places = (places + code.encode(made.poses) - code.encode(pair.poses)).astype(places.dtype)
-        return ((made.features - prior.mean) / prior.spread).astype(motion.dtype), places, made.poses
+        return join(places, ((made.features - prior.mean) / prior.spread).astype(motion.dtype)), made.poses
 
     def _reaching(self, prior: Prior, pair: PairMotion, level: int) -> PairMotion:
         """The pair, with limbs that reach for what they are to touch."""

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from motionloom.blending import smoothstep
 from motionloom.edits.apart import even, shift_apart
 from motionloom.edits.fitting import fit
-from motionloom.edits.pair_motion import PairMotion
 from motionloom.edits.relative_pose import lacking
+from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import CHEST, RIGHT, Contact, Touch
 from motionloom.goals.goal import Goal, overlaid
 from motionloom.ground import GroundPose, relative, turned

@@ -13,10 +13,10 @@ from typing import TypeAlias
 import numpy as np
 
 from motionloom.diffusion import row_noise, row_seed
-from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
-from motionloom.ground import compose, relative, stack
-from motionloom.runtime.pair import PLACE, PairSession, join, part
+from motionloom.features.pair import PairMotion, on_the_spot
+from motionloom.ground import compose, relative
+from motionloom.runtime.pair import PLACE, PairSession, join, part, people
 from motionloom.runtime.prior_condition import Bound
 from motionloom.weights.prior import Prior
 
@@ -114,9 +114,8 @@ class Places:
             return denoised
         code = net.places
         places, motion = part(denoised)
-        features = motion * prior.spread + prior.mean
-        poses = code.decode(people(places))
-        ways = people(compose(poses.reshape(-1, 1, PLACE), two.along(features)))
+        pairs = PairMotion(people(motion * prior.spread + prior.mean), code.decode(people(places)))
+        ways = pairs.ways()
         at = [anchor for some in self.anchors for anchor in some]
         now = np.stack([ways[pair, :, frame] for pair, frame in zip(owner, at, strict=True)])
         rows = np.array([2 * pair + person for pair in owner for person in (0, 1)])
@@ -126,24 +125,14 @@ class Places:
         asked = Bound._make(one[rows] for one in bound)._replace(lengths=lengths)
         answer, _ = part(net(join(noised, crops), levels, asked))
         change = lacking(now, code.decode(people(answer))) * weight
-        changed = (self._moved(features, ways, change) - prior.mean) / prior.spread
+        changed = (self._moved(pairs, change) - prior.mean) / prior.spread
         return join(places, changed.astype(np.float32, copy=False))
 
-    def _moved(self, features: np.ndarray, ways: np.ndarray, change: np.ndarray) -> np.ndarray:
+    def _moved(self, pairs: PairMotion, change: np.ndarray) -> np.ndarray:
         """Features (rows, frames, 263) with a change at the anchors (all anchors, 3) of facing, x and z."""
-        made, start = [], 0
-        for pair, (some, spread) in enumerate(zip(self.anchors, self.spread, strict=True)):
-            own = spread @ change[start : start + len(some)]
-            start += len(some)
-            for person, sign in ((0, -1.0), (1, 1.0)):
-                share = sign * float(self.shares[pair, person])
-                made.append(moved_along(features[2 * pair + person], ways[pair, person], share * own))
-        return np.stack(made)
-
-
-def people(rows: np.ndarray) -> np.ndarray:
-    """Rows (2 * pairs, ...) of people as (pairs, 2, ...)."""
-    return rows.reshape(-1, 2, *rows.shape[1:])
+        own = np.split(change, np.cumsum([len(some) for some in self.anchors])[:-1])
+        every = zip(pairs.each(), self.spread, own, self.shares, strict=True)
+        return np.concatenate([pair.changed(spread @ some, shares).features for pair, spread, some, shares in every])
 
 
 def _crops(motion: np.ndarray, rows: Sequence[int], begins: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
@@ -184,27 +173,3 @@ def lacking(now: np.ndarray, asked: np.ndarray, shares: Sequence[float] | np.nda
     first = on_the_spot(first, -shares[0] * angle)
     line = compose(first, there)[:, 2:] - first[:, 2:]
     return np.concatenate([angle[:, None], line - (second - first)[:, 2:]], axis=1)
-
-
-def on_the_spot(poses: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Ground poses (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
-    c, s = np.cos(angle), np.sin(angle)
-    return stack(c * poses[:, 0] - s * poses[:, 1], s * poses[:, 0] + c * poses[:, 1], poses[:, 2], poses[:, 3])
-
-
-def moved_along(features: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Features (frames, 263) of somebody who goes ``way`` (frames, 4), with a change (frames, 3) of facing, x and z."""
-    new = features.copy()
-    turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
-    new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
-    # velocities are given in the heading of the frame they lead to
-    x, z = _back(features[:-1, 1], features[:-1, 2], np.cos(turn), np.sin(turn))
-    there = on_the_spot(way[1:], turn)
-    more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])
-    new[:-1, 1], new[:-1, 2] = x + more[0], z + more[1]
-    return new
-
-
-def _back(x: np.ndarray, z: np.ndarray, c: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A way on the ground as somebody who turned by an angle of this cosine and sine sees it."""
-    return c * x - s * z, c * z + s * x

@@ -7,7 +7,7 @@ metres, and which way they face. All functions but `encode` take arrays and tens
 `PlaceCode` says how ground poses become the numbers D of a network of two people (Shafir et al. 2024, section 3.2).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -29,15 +29,51 @@ Array = NDArray[np.float64]
 __all__ = ["compose", "mirrored"]
 
 
-class Encoded(NamedTuple):
-    """A pair as features."""
+class PairMotion(NamedTuple):
+    """Two people in one world: what each of them does, and where they are. A batch of pairs has axes before these."""
 
-    features: NDArray[np.float32]
-    """(2, frames, 263)"""
-    poses: Array
+    features: NDArray[Any]
+    """(2, frames, 263), not standardised."""
+    poses: NDArray[Any]
     """(2, 4) ground poses in the world, at frame 0."""
-    floors: Array
-    """(2,) metres: the height that each person's features call 0."""
+
+    @staticmethod
+    def stack(pairs: "Sequence[PairMotion]") -> "PairMotion":
+        """A batch of pairs of one length."""
+        return PairMotion(np.stack([one.features for one in pairs]), np.stack([one.poses for one in pairs]))
+
+    def each(self) -> "Iterator[PairMotion]":
+        """The pairs of a batch, ground poses in float64."""
+        return map(PairMotion, self.features, self.poses.astype(np.float64))
+
+    def places(self) -> NDArray[Any]:
+        """(2, frames, 22, 3) metres in the world."""
+        return decode(self.features, self.poses)
+
+    def ways(self) -> NDArray[Any]:
+        """(2, frames, 4) ground poses."""
+        return compose(self.poses[..., None, :], along(self.features))
+
+    def crop(self, first: int, last: int) -> "PairMotion":
+        """The frames from ``first`` to before ``last``, with the ground poses at the first of them.
+
+        (The published code keeps those of the file's first frame for every crop.)
+        """
+        poses = compose(self.poses, along(self.features[..., : first + 1, :])[..., first, :])
+        return PairMotion(self.features[..., first:last, :], poses)
+
+    def moved_to(self, pose: np.ndarray, person: int) -> "PairMotion":
+        """The same moved rigidly on the ground so that the ground pose (4,) of ``person`` at frame 0 is ``pose``."""
+        return self._replace(poses=compose(pose, relative(self.poses[person], self.poses)))
+
+    def changed(self, change: np.ndarray, shares: np.ndarray) -> "PairMotion":
+        """With the second person's facing, x and z changed (frames, 3) relative to the first: by shares (2,) of it."""
+        features, poses, ways = self.features.copy(), self.poses.copy(), self.ways()
+        for person, share in ((0, -shares[0]), (1, shares[1])):
+            features[person] = moved_along(features[person], ways[person], share * change)
+            poses[person] = on_the_spot(poses[person, None], share * change[:1, 0])[0]
+            poses[person, 2:] += share * change[0, 1:]
+        return PairMotion(features, poses)
 
 
 def swapped(pair: Numbers, axis: int = 0) -> Numbers:
@@ -48,23 +84,27 @@ def swapped(pair: Numbers, axis: int = 0) -> Numbers:
 # Features and ground poses
 
 
-def encode(positions: np.ndarray, *, heading: Heading = "corrected") -> Encoded:
-    """Two people in one world, (2, frames, 22, 3) metres at 20 fps, +Y up, to features (2, frames - 1, 263).
+def floors(positions: np.ndarray) -> Array:
+    """(2,) metres: the height that the features of each person call 0; positions (2, frames, 22, 3)."""
+    return np.asarray(positions, dtype=np.float64)[..., 1].min(axis=(1, 2))
 
-    Each is relative to the own ground pose in frame 0 and to the own lowest point, as `humanml.canonical` does. The
+
+def encode(positions: np.ndarray, *, heading: Heading = "corrected") -> PairMotion:
+    """Two people in one world, (2, frames, 22, 3) metres at 20 fps, +Y up, of which features have a frame less.
+
+    Each is relative to the own ground pose in frame 0 and to the own of `floors`, as `humanml.canonical` does. The
     bodies are taken as they are: people of the uniform size, for the shipped weights, which were trained on
     ``corrected`` headings (smoothed ones, in frame 0 too); ``compatible`` is the published way, for published weights.
     """
     p = _checked(positions)
     place = SMPL_LAYOUT.place(p[:, 0])
     poses = np.stack([np.cos(place.facing), np.sin(place.facing), place.origin[:, 0], place.origin[:, 2]], axis=-1)
-    floors = p[..., 1].min(axis=(1, 2))
-    local = from_world(p - floors[:, None, None, None] * np.array([0.0, 1.0, 0.0]), poses[:, None, None])
+    local = from_world(p - floors(p)[:, None, None, None] * np.array([0.0, 1.0, 0.0]), poses[:, None, None])
     if heading == "corrected":
         turn = np.stack([humanml.heading_quaternions(person, heading=heading)[0] for person in local])
         w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
         poses = compose(poses, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
-    return Encoded(np.stack([humanml.encode(person, heading=heading) for person in local]), poses, floors)
+    return PairMotion(np.stack([humanml.encode(person, heading=heading) for person in local]), poses)
 
 
 def decode(features: Numbers, poses: Numbers) -> Numbers:
@@ -83,13 +123,28 @@ def along(features: Numbers) -> Numbers:
     return stack(1 - 2 * y * y, -2 * w * y, place[..., 0], place[..., 2])  # it turns the world into the heading
 
 
-def later(features: Numbers, poses: Numbers, frame: int) -> Numbers:
-    """Ground poses (..., 4) at another frame of (..., frames, 263), of people with ground poses (..., 4) at frame 0.
+def on_the_spot(poses: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Ground poses (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
+    c, s = np.cos(angle), np.sin(angle)
+    return stack(c * poses[:, 0] - s * poses[:, 1], s * poses[:, 0] + c * poses[:, 1], poses[:, 2], poses[:, 3])
 
-    These are the ground poses of the crop that begins there: ``decode(features[..., frame:, :], later(...))`` is the
-    end of ``decode(features, poses)``. (The published code keeps those of the file's first frame for every crop.)
-    """
-    return compose(poses, along(features[..., : frame + 1, :])[..., frame, :])
+
+def moved_along(features: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Features (frames, 263) of somebody who goes ``way`` (frames, 4), with a change (frames, 3) of facing, x and z."""
+    new = features.copy()
+    turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
+    new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
+    # velocities are given in the heading of the frame they lead to
+    x, z = _back(features[:-1, 1], features[:-1, 2], np.cos(turn), np.sin(turn))
+    there = on_the_spot(way[1:], turn)
+    more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])
+    new[:-1, 1], new[:-1, 2] = x + more[0], z + more[1]
+    return new
+
+
+def _back(x: np.ndarray, z: np.ndarray, c: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A way on the ground as somebody who turned by an angle of this cosine and sine sees it."""
+    return c * x - s * z, c * z + s * x
 
 
 # Numbers for a network

@@ -305,7 +305,7 @@ class Live(Stage[Frame], Asked):
         (request,), (person,) = requests, self.people
         count, frames = len(request.known), self.settings.ahead
         noise = self._noise.of(self._next - count, count + frames)
-        known = request.known.astype(np.float32)
+        known = request.known.features.astype(np.float32)
         features = self._sampler(request.words, known, frames, noise, edits=request.edits, turns=request.turns)
         person.accept(request, features, self._next)
 

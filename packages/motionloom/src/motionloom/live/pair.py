@@ -11,6 +11,7 @@ import numpy as np
 from motionloom.diffusion import row_seed
 from motionloom.edits.steering import Correction
 from motionloom.features.layout import FPS
+from motionloom.features.pair import PairMotion
 from motionloom.goals.roles import prompts_of
 from motionloom.ground import GroundPose, relative
 from motionloom.live.commands import Command, Say
@@ -20,7 +21,8 @@ from motionloom.live.settings import Settings
 from motionloom.live.window import leaving
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
-from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features
+from motionloom.tasks.pair import PairEdits, PairSampling, pair_features
+from motionloom.tasks.people import Duet, known_state
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -83,28 +85,30 @@ class LivePair(Stage[tuple[Frame, Frame]]):
 
     def _windows(self, requests: Sequence[Request]) -> None:
         count, frames, prior = len(requests[0].known), self.settings.ahead, self._prior
-        known = np.stack([request.known for request in requests]).astype(np.float32)
+        known = np.stack([request.known.features for request in requests]).astype(np.float32)
         changes: list[Correction | None] = [None, None]
-        observed = None
+        given = None
         if count:
-            poses = relative(requests[0].begin.numbers(), np.stack([request.begin.numbers() for request in requests]))
-            observed = known_state(prior, self._net, known, poses, count + frames)
+            begins = np.stack([request.known.begin.numbers() for request in requests])
+            given = known_state(
+                self._net, PairMotion.stack([PairMotion(known, relative(begins[0], begins))]), count + frames
+            )
         for i, request in enumerate(requests):
             if count or request.edits or request.turns:
                 changes[i] = leaving(prior, known[i], frames, edits=request.edits, turns=request.turns)
         frozen = [bool(request.edits or request.turns) for request in requests]
-        features, sampled = pair_features(
+        sampled = pair_features(
             prior,
             self._net,
             [request.words for request in requests],
             count + frames,
             seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)],
-            edits=PairEdits(observed, changes, frozen=frozen),
+            edits=PairEdits(given, changes, frozen=frozen),
             sampling=PairSampling(guidance=self.settings.guidance, steps=self.settings.steps),
         )
         self._calls += self.settings.steps
-        made = features[0].astype(np.float64)
-        begins = [None if count else GroundPose.of_numbers(pose) for pose in sampled[0]]
+        made = sampled.features[0].astype(np.float64)
         for i, (person, request) in enumerate(zip(self.people, requests, strict=True)):
-            window = np.concatenate([request.known, made[i, count:]])
-            person.accept(request, window, self._next, begins[i])
+            window = np.concatenate([request.known.features, made[i, count:]])
+            begin = None if count else GroundPose.of_numbers(sampled.poses[0, i])
+            person.accept(request, window, self._next, begin)

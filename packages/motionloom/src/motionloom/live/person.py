@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from motionloom.edits.heading import heading_for
 from motionloom.edits.steering import Correction, toward
-from motionloom.features import humanml
-from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.features.layout import FPS
+from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, overlaid
 from motionloom.goals.paths import WALKING
 from motionloom.ground import GroundPose
@@ -25,7 +25,7 @@ from motionloom.live.targets import SOON, Target, must_go, same_place, way_to, w
 from motionloom.live.words import STANDS, for_pace, stays
 from motionloom.motion import Motion, ground_pose
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.long import Past
+from motionloom.tasks.long import last_frames
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
@@ -80,10 +80,8 @@ class Asked(ABC):
 class Request:
     """What the next window of one person must be."""
 
-    known: Array
-    """(frames, 263) features of the last frames, not standardised."""
-    begin: GroundPose
-    """Where the person is in the first of them."""
+    known: PlacedMotion
+    """The last frames."""
     words: str
     edits: list[Correction]
     turns: list[Correction]
@@ -99,11 +97,9 @@ class _Plan:
     """Frames from ``first`` on: some of the past, which were shown, and what was sampled."""
 
     first: int
-    features: Array
-    """(frames, 263), not standardised."""
-    places: list[GroundPose]
-    """Where the person is in each frame, one more than there are frames."""
+    placed: PlacedMotion
     motion: Motion
+    """The same as a body."""
     shown: Motion
     """The same on the skeleton that is shown."""
     words: str
@@ -210,20 +206,17 @@ class Person(Asked):
 
     def _begun(self, start: Motion) -> _Plan:
         """A plan that is over: the end of a motion of anybody, behind which frame 0 is."""
-        past = Past.of(start)
-        known = past.known.astype(np.float64)
-        positions, contacts, places = decoded(known, _back(known, past.end))
-        motion = body(positions, contacts, FPS, None)
-        return _Plan(-len(known), known, places, motion, put(motion, self.skeleton, None), STANDS)
+        placed = last_frames(start)
+        motion = body(placed.positions, placed.contacts, FPS, None)
+        return _Plan(-len(placed), placed, motion, put(motion, self.skeleton, None), STANDS)
 
     def request(self, frame: int, *, take: bool) -> Request:
         """What the window from ``frame`` on must be; with ``take`` what was asked is taken up."""
-        known, begin = np.zeros((0, WIDTH)), GroundPose()
+        known = PlacedMotion.nothing()
         if (plan := self._plan) is not None:
             end = frame - plan.first
-            known = plan.features[max(0, end - self._settings.known) : end]
-            begin = plan.places[end - len(known)]
-        course = _course(known, begin)
+            known = plan.placed.crop(max(0, end - self._settings.known), end)
+        course = _course(known)
         taken: list[Command] = []
         while take and self._asked:
             taken.append(self._asked.popleft())
@@ -235,21 +228,21 @@ class Person(Asked):
             edits.append(toward(goal.seen_from(course.place), self._prior, first=len(known), known=True))
         if self._trail is None and self._steer.speed is None and self._steer.direction is not None:
             turns.append(heading_for(self._steer.direction - course.place.facing, self._prior, first=len(known)))
-        return Request(known, begin, words, edits, turns, again, taken)
+        return Request(known, words, edits, turns, again, taken)
 
     def accept(self, request: Request, features: Array, frame: int, begin: GroundPose | None = None) -> None:
         """Take a window (known and sampled frames, 263) for the plan; ``begin`` where nothing was known."""
         count = len(request.known)
-        positions, contacts, places = decoded(features, begin or request.begin)
+        placed = PlacedMotion(features, begin or request.known.begin)
         old = self._plan
         if old is None:
-            motion = body(positions, contacts, FPS, None)
+            motion = body(placed.positions, placed.contacts, FPS, None)
             shown = put(motion, self.skeleton, None)
         else:
             part = slice(frame - old.first - count, frame - old.first)
-            motion = body(positions, contacts, FPS, old.motion.frames(part.start, part.stop))
+            motion = body(placed.positions, placed.contacts, FPS, old.motion.frames(part.start, part.stop))
             shown = put(motion, self.skeleton, old.shown.frames(part.start, part.stop))
-        self._plan = _Plan(frame - count, features, places, motion, shown, request.words)
+        self._plan = _Plan(frame - count, placed, motion, shown, request.words)
 
     def _take_up(self, command: Command, frame: int, course: Course) -> None:
         if isinstance(command, Say):
@@ -290,9 +283,9 @@ class Person(Asked):
         """Where somebody will be in a frame if he goes on as he does."""
         if (plan := self._plan) is None:
             return course.place
-        last = len(plan.places) - 1
-        beyond, there = max(0, frame - plan.first - last), plan.places[min(frame - plan.first, last)]
-        back = plan.places[max(0, last - 4)]
+        last = len(plan.placed)
+        beyond, there = max(0, frame - plan.first - last), plan.placed.at(min(frame - plan.first, last))
+        back = plan.placed.at(max(0, last - 4))
         x, z = ((there.x - back.x) / 4, (there.z - back.z) / 4) if beyond else (0.0, 0.0)
         return GroundPose(there.x + beyond * x, there.z + beyond * z, there.facing)
 
@@ -378,27 +371,9 @@ class Person(Asked):
         return words
 
 
-def decoded(features: Array, begin: GroundPose) -> tuple[Array, Array, list[GroundPose]]:
-    """Places (frames, 22, 3) in the world, contacts (frames, 4), and where the person is, one frame more."""
-    longer = np.concatenate([features, features[-1:]])
-    positions = begin.to_world(humanml.decode_positions(longer))
-    facing = begin.facing - 2 * np.concatenate([[0.0], np.cumsum(features[:, 0])])
-    places = [GroundPose(float(p[0, 0]), float(p[0, 2]), float(f)) for p, f in zip(positions, facing, strict=True)]
-    return positions[:-1], features[:, LAYOUT["contacts"]], places
-
-
-def _back(features: Array, end: GroundPose) -> GroundPose:
-    """Where the person was in the first of some frames behind which he is at ``end``."""
-    last = decoded(features, GroundPose())[2][-1]
-    turn = end.facing - last.facing
-    x, _, z = GroundPose(facing=turn).to_world(np.array([last.x, 0.0, last.z]))
-    return GroundPose(end.x - float(x), end.z - float(z), turn)
-
-
-def _course(known: Array, begin: GroundPose) -> Course:
+def _course(known: PlacedMotion) -> Course:
     if not len(known):
-        return Course(begin, (0.0, 0.0))
-    places = decoded(known, begin)[2]
-    back = places[max(0, len(places) - 5)]
-    count = min(4, len(places) - 1)
-    return Course(places[-1], ((places[-1].x - back.x) / count, (places[-1].z - back.z) / count))
+        return Course(known.begin, (0.0, 0.0))
+    count = min(4, len(known))
+    end, back = known.end, known.at(len(known) - count)
+    return Course(end, ((end.x - back.x) / count, (end.z - back.z) / count))

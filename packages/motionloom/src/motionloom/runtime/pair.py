@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
-from motionloom.features.pair import PlaceCode
+from motionloom.features.pair import PairMotion, PlaceCode
 from motionloom.runtime.prior import HELD, Inputs, PriorSession
 from motionloom.runtime.prior_condition import Bound, Condition, Floats
 from motionloom.runtime.session import Session
@@ -122,6 +122,20 @@ class PairSession:
         """See `PriorSession.bind`; a row for each person."""
         return self.prior.bind(cond)
 
+    def states(self, pairs: PairMotion, frames: int) -> Floats:
+        """Pairs (pairs, 2, some frames, features) to standardised states (2 * pairs, 1 + frames, features), with zeros
+        behind them."""
+        spread = np.where(self.std > 0, self.std, np.float32(1))
+        motion = rows((pairs.features.astype(np.float32) - self.mean) / spread)
+        missing = [(0, 0), (0, frames - motion.shape[1]), (0, 0)]
+        return join(rows(self.places.encode(pairs.poses.astype(np.float32))), np.pad(motion, missing))
+
+    def pairs(self, states: Floats) -> PairMotion:
+        """States (2 * pairs, 1 + frames, features) to pairs; the first person of each is at the origin facing +Z, or
+        where a code of the kind world says."""
+        places, motion = part(states)
+        return PairMotion(people(motion * self.std + self.mean), self.places.decode(people(places)))
+
     @cached_property
     def _network(self) -> Session:
         weights = {**self.prior.weights, **self.tensors, "mean": self.mean, "std": self.std}
@@ -149,9 +163,14 @@ class PairSession:
         return join(place, self._inputs.frames(tokens, motion.shape[1]))
 
 
-def other(rows: Floats) -> Floats:
-    """For each row that of the other person: rows 2k and 2k + 1 exchanged."""
-    return rows.reshape(-1, 2, *rows.shape[1:])[:, ::-1].reshape(rows.shape)
+def people(rows: np.ndarray) -> np.ndarray:
+    """Rows (2 * pairs, ...) of people as (pairs, 2, ...)."""
+    return rows.reshape(-1, 2, *rows.shape[1:])
+
+
+def rows(pairs: np.ndarray) -> np.ndarray:
+    """The inverse of `people`."""
+    return pairs.reshape(2 * len(pairs), *pairs.shape[2:])
 
 
 def join(places: Floats, motion: Floats) -> Floats:

@@ -5,13 +5,12 @@ The goal is seen from the person's ground pose at frame 0; there it steers every
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal, Unpack
 
 import numpy as np
 
-from motionloom import rotations as rot
 from motionloom.diffusion import Denoiser, Weight, blend, guide, mix
 from motionloom.edits import fitting
 from motionloom.edits.steering import Correction, corrected, toward
@@ -19,7 +18,6 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask as named
 from motionloom.features.layout import ric
 from motionloom.goals.goal import Goal, start_of
-from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
@@ -119,7 +117,7 @@ def control_each(
         sampling=sampling,
         progress=progress,
     )
-    sampled = [moved(to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock), place) for row in made]
+    sampled = [to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock).placed(place) for row in made]
     return [judged(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
 
 
@@ -221,14 +219,6 @@ def _seeing(
         return last
 
     return seen
-
-
-def moved(motion: Motion, place: GroundPose) -> Motion:
-    """A motion that starts at the origin facing +Z, put to ``place``."""
-    turn = rot.rotvec_to_quat(np.array([0.0, place.facing, 0.0]))
-    rotations = motion.rotations.copy()
-    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
-    return replace(motion, root=place.to_world(motion.root), rotations=rot.unroll(rotations))
 
 
 def judged(motion: Motion, sampled: Motion, goal: Goal) -> Controlled:

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from motionloom.diffusion import lerp
 from motionloom.edits.bodies import Bodies
 from motionloom.edits.meeting import Meeting
-from motionloom.edits.relative_pose import PoseGuidance, people, relative_pose_guidance
+from motionloom.edits.relative_pose import PoseGuidance, relative_pose_guidance
 from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
 from motionloom.features.layout import FPS, WIDTH
-from motionloom.features.pair import one_world
+from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal
 from motionloom.goals.roles import prompts_of
@@ -30,39 +29,27 @@ from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.requests.sampling import PairSampling, PairSettings
-from motionloom.requests.shared import LONGEST
-from motionloom.retarget import joints22, to_smpl22
-from motionloom.retarget.anatomy import read_body
-from motionloom.runtime.pair import PLACE, PairSession, join, part
+from motionloom.runtime.pair import PLACE, PairSession, join, part, people
 from motionloom.runtime.prior import PriorSession
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.body import solve_stream
-from motionloom.tasks.control import moved
 from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, lengthened, same_net
 from motionloom.tasks.pair import (
-    Duet,
     PairEdits,
     check_pair,
     check_person,
-    known_state,
     meetings_of,
     pair_features,
     pair_seeds,
     person_seeds,
-    poses_at,
-    stacked,
 )
+from motionloom.tasks.people import Duet, Partner
 from motionloom.tasks.sampling import Moves, Progress, sample_chain
-from motionloom.tasks.splice import apply_positions, person_at_20
-from motionloom.tasks.text import finish
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 
-SHORTEST = 1.0
-"""Seconds of the shortest motion that somebody can react to."""
 BATCH = 8
 """Rows of a long duet in one network call."""
 
@@ -95,45 +82,19 @@ def react(
     """
     said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     check_pair(prior, count=chosen.number(), seconds=given.seconds)
-    if not SHORTEST - 1e-6 <= given.seconds <= LONGEST:
-        raise MotionloomError(
-            f"the given motion is {given.seconds:.2f} s long; {SHORTEST:g} to {LONGEST:g} s can be reacted to"
-        )
-    legs = read_body(given.skeleton).leg, read_body(SMPL22).leg
-    ratio = float(np.mean(legs)) / legs[1]
-    alone = person_at_20(given)
-    places = one_world([alone, alone], legs)[0]
-    known, poses, _ = two.encode(np.stack([places, places]))
-    net = block.net(prior)
-    observed = known_state(prior, net, known, poses, known.shape[1])
-    observed.mask[:, 0] = observed.mask[1] = False
-    features, sampled = pair_features(
+    partner, net, count = Partner.of(given), block.net(prior), chosen.number()
+    known = partner.state(net, count)
+    sampled = pair_features(
         prior,
         net,
-        said * chosen.number(),
-        known.shape[1],
+        said * count,
+        known.values.shape[1] - 1,
         seeds=pair_seeds(chosen),
-        edits=PairEdits(stacked([observed] * chosen.number()), meetings=meetings_of(said, chosen)),
+        edits=PairEdits(known, meetings=meetings_of(said, chosen)),
         sampling=chosen,
         progress=progress,
     )
-    floor, made = _floor(given), []
-    at = np.arange(len(given)) / given.fps * FPS
-    for numbers, standing in zip(features, sampled.astype(np.float64), strict=True):
-        other_pose = GroundPose.of_numbers(poses_at(standing, GroundPose.of_numbers(poses[0]), 0)[1])
-        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), other_pose).at(at, given.fps)
-        height = np.array([0.0, floor, 0.0])
-        made.append((given, replace(other, root=other.root * [ratio, 1.0, ratio] + height)))
-    return made
-
-
-def _floor(motion: Motion) -> float:
-    """Metres: the height on which somebody's own motion stands; raises where it does not stand upright along +Y."""
-    few = motion.frames(0, min(len(motion), round(3 * motion.fps) + 2))
-    uniform, own = to_smpl22(few), joints22(few)
-    apply_positions(uniform.positions(), few, foot_lock=False)
-    ratio = read_body(motion.skeleton).leg / read_body(SMPL22).leg
-    return float(np.median(own[:, 0, 1] - ratio * uniform.root[:, 1]))
+    return [(given, partner.answer(prior, one, foot_lock=foot_lock)) for one in sampled.each()]
 
 
 # Several prompts
@@ -181,19 +142,19 @@ def compose_pair(
         raise MotionloomError("a path of the other person goes with one of the first; give both")
     both = np.stack([track.place(0).numbers() for track in tracks if track]) if other is not None else None
     sampled = duet_features(prior, block.net(prior), asked, begin=both, sampling=chosen, progress=progress)
-    features, poses = next(sampled)
+    first = next(sampled)
     if both is not None:
-        poses = both
+        first = PairMotion(first.features, both)
     elif track := tracks[person]:
-        poses = poses_at(poses, track.place(0), person)
-    pieces = tee(chain([features], (piece for piece, _ in sampled)))
+        first = first.moved_to(track.place(0).numbers(), person)
+    pieces = tee(chain([first], sampled))
     people = [
         solve_stream(
             in_world(
                 prior,
                 _of(pieces[i], i),
                 deque(segment.goal for segment in asked[i]),
-                GroundPose.of_numbers(poses[i]),
+                GroundPose.of_numbers(first.poses[i]),
                 tracks[i],
             ),
             prior.fps,
@@ -215,8 +176,8 @@ def _asked(segments: Sequence[Segment], person: int, track: Track | None, goals_
     return result
 
 
-def _of(pieces: Iterable[np.ndarray], person: int) -> Iterator[np.ndarray]:
-    return (piece[person] for piece in pieces)
+def _of(pieces: Iterable[PairMotion], person: int) -> Iterator[np.ndarray]:
+    return (piece.features[person] for piece in pieces)
 
 
 def duet_features(
@@ -228,8 +189,8 @@ def duet_features(
     sampling: PairSampling | None = None,
     progress: Moves | None = None,
     **settings: Unpack[PairSettings],
-) -> Iterator[tuple[np.ndarray, Array]]:
-    """Pieces (2, frames, 263), not standardised, one per segment, and the ground poses (2, 4) at the very first frame.
+) -> Iterator[PairMotion]:
+    """Pieces, one per segment; the ground poses of the first one are those of the very first frame.
 
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
     begin: the ground poses (2, 4) of the first frame, where they are known.
@@ -254,7 +215,7 @@ def duet_features(
         row.before = None  # what a finished row began with is needed no more
         motion, places = _parted(state)
         features = row.people[0].between(prior.smoothed(motion)) * prior.std + prior.mean
-        yield features, net.places.decode(places).astype(np.float64)
+        yield PairMotion(features, net.places.decode(places).astype(np.float64))
 
 
 def _parted(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -364,10 +325,11 @@ class _PairDenoiser:
             begin = self._begin_or(places, row, level)
             motion = self._moved(row, level, motion, begin, state=state)
             if row.bodies:
-                motion, places, begin = row.bodies.edit(self.prior, self.net.places, motion, places, begin, level=level)
+                state, begin = row.bodies.edit(self.prior, self.net.places, join(places, motion), level, begin)
+                places, motion = part(state)
             made.append(_strung(motion, places))
-            features = motion * self.prior.std + self.prior.mean
-            row.ends[level] = two.later(features, begin, row.length - max(row.overlap, 1))
+            end = row.length - max(row.overlap, 1)
+            row.ends[level] = self._pair(motion, begin).crop(end, end).poses
         return made
 
     def _shown(self, row: _PairRow, places: np.ndarray, level: int) -> np.ndarray:
@@ -390,15 +352,18 @@ class _PairDenoiser:
         begin = self._begin(row, level)
         return self.net.places.decode(places) if begin is None else begin
 
-    def kept(self, row: _PairRow, state: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
-        """Features (2, frames, 263) of a denoised row between its seams, and the ground poses in the first one."""
-        motion, places = _parted(state)
-        features, one = motion * self.prior.std + self.prior.mean, row.people[0]
-        return one.between(features), two.later(features, self._begin_or(places, row, level), one.before)
+    def _pair(self, motion: np.ndarray, begin: np.ndarray) -> PairMotion:
+        """A standardised motion (2, frames, 263) that begins with ground poses (2, 4)."""
+        return PairMotion(motion * self.prior.std + self.prior.mean, begin)
 
-    def poses(self, kept: list[tuple[np.ndarray, np.ndarray]]) -> Array:
+    def kept(self, row: _PairRow, state: np.ndarray, level: int) -> PairMotion:
+        """A denoised row between its seams."""
+        (motion, places), one = _parted(state), row.people[0]
+        return self._pair(motion, self._begin_or(places, row, level)).crop(one.before, one.before + one.frames)
+
+    def poses(self, kept: list[PairMotion]) -> Array:
         """(2, frames, 22, 3) of what was `kept` of rows."""
-        return np.concatenate([two.decode(own, poses) for own, poses in kept], axis=1)
+        return np.concatenate([one.places() for one in kept], axis=1)
 
     def _moved(
         self, row: _PairRow, level: int, motion: np.ndarray, begin: np.ndarray, *, state: np.ndarray

@@ -11,7 +11,6 @@ from typing import Literal, TypeAlias, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
 from motionloom.edits.boundary import InpaintWindow
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
@@ -291,12 +290,12 @@ def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motio
     """The end flows into the beginning: a stretch between the last frames and, moved behind them, the first ones."""
     rest, around = len(motion) - round(blend * motion.fps), round(CONTEXT[1] * motion.fps)
     tail, head = motion.frames(max(rest - around, 0), rest), motion.frames(0, min(around, rest))
-    (end, facing), (begin, faced) = standing(motion, len(motion) - 1), standing(motion, 0)
-    turn = rot.multiply(facing, rot.inverse(faced))
-    straight = 2 * np.arccos(min(abs(float(turn[0])), 1.0)) < NEAR[1]
-    here = straight and float(np.linalg.norm((end - begin)[[0, 2]])) < NEAR[0]
+    end, start = standing(motion, len(motion) - 1), standing(motion, 0)
+    metres, radians = end.apart(start)
+    straight = radians < NEAR[1]
+    here = straight and metres < NEAR[0]
     if not here:
-        head = carried_level(head, rot.IDENTITY if straight else turn, begin, end)
+        head = carried_level(head, start, replace(end, facing=start.facing) if straight else end)
     gap = _between(tail, head, len(motion) - rest)
     first, last = len(tail), len(tail) + len(gap)
     window = concatenated(tail, gap, head)
@@ -304,9 +303,9 @@ def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motio
     begin = max(rest - around, 0) / motion.fps
     made = sampler.sample(window, replace(stretch, facing=straight, place=here, begin=begin), seed)
     if not here:
-        (to, sampled), (begin, faced) = standing(made, last), standing(window, last)
-        turn = rot.IDENTITY if straight else rot.multiply(sampled, rot.inverse(faced))
-        window = concatenated(tail, gap, carried_level(head, turn, begin, to))
+        arrived, left = standing(made, last), standing(window, last)
+        arrived = replace(arrived, facing=left.facing) if straight else arrived
+        window = concatenated(tail, gap, carried_level(head, left, arrived))
     spliced = splice(window, made, first, last=last)
     return concatenated(motion.frames(0, rest), spliced.frames(first, last))
 

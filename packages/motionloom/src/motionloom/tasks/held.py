@@ -1,12 +1,11 @@
 """Parts of a prediction that are given: held to what another motion does."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
 from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
@@ -113,13 +112,11 @@ def _resolved(part: FixedPart) -> tuple[set[int], bool]:
 
 def _placed(past: Motion, source: Motion) -> Motion:
     """The source where the past ends, if it is not there."""
-    (end, facing), (begin, faced) = standing(past, len(past) - 1), standing(source, 0)
-    step = end - standing(past, max(len(past) - 2, 0))[0]
-    turn = rot.multiply(facing, rot.inverse(faced))
-    apart = 2 * np.arccos(min(abs(float(turn[0])), 1.0))
-    if apart < NEAR[1] and float(np.linalg.norm((end - begin)[[0, 2]])) < NEAR[0]:
+    end, begin, before = standing(past, len(past) - 1), standing(source, 0), standing(past, max(len(past) - 2, 0))
+    metres, radians = end.apart(begin)
+    if radians < NEAR[1] and metres < NEAR[0]:
         return source
-    return carried_level(source, turn, begin, end + step)
+    return carried_level(source, begin, replace(end, x=2 * end.x - before.x, z=2 * end.z - before.z))
 
 
 def check_like(past: Motion, other: Motion, what: str) -> None:

@@ -157,8 +157,7 @@ def _laid(clip: Motion, source: Motion, first: int, kept: Kept) -> Motion:
     last = first + len(source)
     there = clip.frames(first, last)
     piece = source if source.skeleton == clip.skeleton else onto(to_smpl22(source), there)
-    (to, facing), (begin, faced) = standing(there, 0), standing(piece, 0)
-    piece = carried_level(piece, rot.multiply(facing, rot.inverse(faced)), begin, to)
+    piece = carried_level(piece, standing(piece, 0), standing(there, 0))
     # Outside it is as at its ends: from how far that is from the clip, the splice eases in and out.
     at = np.clip(np.arange(len(clip)) - first, 0, len(piece) - 1)
     made = with_place(replace(clip, rotations=piece.rotations[at]), place_of(piece)[at])

@@ -22,13 +22,13 @@ from motionloom.diffusion import lerp
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
-from motionloom.motion import Motion, ground_pose
+from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
@@ -202,7 +202,7 @@ def long_features(
         return row.between(state) * prior.std + prior.mean
 
     def poses(pieces: list[np.ndarray]) -> Array:
-        return decoded(np.concatenate(pieces).astype(np.float64), place)[0][None]
+        return PlacedMotion(np.concatenate(pieces), place).positions[None]
 
     made = sample_chain(
         prior,
@@ -374,20 +374,23 @@ class Past:
 
     @staticmethod
     def of(motion: Motion) -> "Past":
-        """Of anybody's motion of at least `LOOK_BACK` frames at 20 per second."""
-        positions = person_at_20(motion)
-        if len(positions) <= LOOK_BACK:
-            raise MotionloomError(
-                f"the motion to go on from is {motion.seconds:.2f} s long; at least {LOOK_BACK / FPS:g} s are needed"
-            )
-        positions = positions[-LOOK_BACK - 1 :]
-        begin = ground_pose(positions[0])
-        known = humanml.encode(begin.from_world(positions))
-        return Past(known, decoded(known.astype(np.float64), begin)[1])
+        """Of anybody's motion, as of `last_frames`."""
+        seen = last_frames(motion)
+        return Past(seen.features, seen.end)
 
     def holder(self, prior: Prior, length: int) -> Correction:
         """Makes the first frames of a row's estimate the known ones, and the next ones leave them without a jump."""
         return holding(self.known, prior, length)
+
+
+def last_frames(motion: Motion) -> PlacedMotion:
+    """The `LOOK_BACK` last frames at 20 per second of anybody's motion; raises `MotionloomError` for a shorter one."""
+    positions = person_at_20(motion)
+    if len(positions) <= LOOK_BACK:
+        raise MotionloomError(
+            f"the motion to go on from is {motion.seconds:.2f} s long; at least {LOOK_BACK / FPS:g} s are needed"
+        )
+    return PlacedMotion.of(positions[-LOOK_BACK - 1 :])
 
 
 def holding(own: np.ndarray, prior: Prior, length: int, *, last: bool = False) -> Correction:
@@ -461,15 +464,6 @@ def in_world(
             part = track.path.crop(first, first + len(piece))
             piece = toward(part.seen_from(place), prior)((piece - mean) / spread, 0) * spread + mean
             goal = overlaid(part, goal)
-        features = piece.astype(np.float64)
-        positions, after = decoded(features, place)
-        yield Places(positions, features[:, LAYOUT["contacts"]], goal)
-        place, first = after, first + len(piece)
-
-
-def decoded(features: Array, place: GroundPose) -> tuple[Array, GroundPose]:
-    """(frames, 22, 3) of features (frames, 263) that begin at a place, and the place of the frame behind them."""
-    positions = humanml.decode_positions(np.concatenate([features, features[-1:]]))
-    x, _, z = place.to_world(positions[-1, 0])
-    facing = place.facing - 2 * float(features[:, LAYOUT["yaw_velocity"]].sum())
-    return place.to_world(positions[:-1]), GroundPose(float(x), float(z), facing)
+        placed = PlacedMotion(piece, place)
+        yield Places(placed.positions, placed.contacts, goal)
+        place, first = placed.end, first + len(piece)

@@ -10,50 +10,35 @@ from dataclasses import dataclass, replace
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
 from motionloom.edits.bodies import Bodies
 from motionloom.edits.fitting import fit
 from motionloom.edits.meeting import Meeting, met
-from motionloom.edits.relative_pose import people, relative_pose_guidance
+from motionloom.edits.relative_pose import relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
 from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
-from motionloom.features.humanml import positions_at
-from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.features.pair import one_world, together
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.roles import prompts_of
-from motionloom.ground import GroundPose, compose, relative
-from motionloom.motion import Motion
+from motionloom.ground import GroundPose
 from motionloom.requests.sampling import PairSampling, PairSettings, Seed
 from motionloom.requests.shared import LONGEST
-from motionloom.retarget import to_smpl22
-from motionloom.retarget.anatomy import read_body
-from motionloom.runtime.pair import PLACE, PairSession, join, part
-from motionloom.tasks.control import moved
-from motionloom.tasks.long import Past, lengthened
+from motionloom.runtime.pair import PairSession, people
+from motionloom.tasks.long import Past
+from motionloom.tasks.people import Duet, Pasts, finish_person, known_state
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
-from motionloom.tasks.splice import concatenated, continued
-from motionloom.tasks.text import finish, frames_in
+from motionloom.tasks.text import frames_in
 from motionloom.tasks.watching import View
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
-Array = NDArray[np.float64]
-Duet = tuple[Motion, Motion]
 Prompt = str | tuple[str, str]
 
 PAIRS = 8
 """Pairs denoised at once."""
-CONTEXT = 3.0
-"""Seconds of a past that are looked at for where its floor is."""
-SEEN = 40
-"""Frames of a past, at 20 per second, that the network sees."""
-LEAST = 4
-"""Frames behind a past that are put on a skeleton at once, at least, for its seam to fade over."""
 MOST = 10_000.0
 """Seconds of all duets together that are made in one call."""
 
@@ -83,8 +68,8 @@ def pair_features(
     sampling: PairSampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[PairSettings],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Features (pairs, 2, frames, 263), not standardised, and relative poses (pairs, 2, 4) of `features.pair`.
+) -> PairMotion:
+    """Pairs, of features (pairs, 2, frames, 263) and poses (pairs, 2, 4).
 
     Args:
         net: the block over the prior's network.
@@ -106,67 +91,65 @@ def pair_features(
         )
     known = False if given.observed is None else given.observed.mask
     mask = np.broadcast_to(known, (rows, 1 + frames, len(prior.mean)))
-    bodies = [Bodies.of(mask[k : k + 2], frozen[k : k + 2], meetings[k // 2]) for k in range(0, rows, 2)]
-
-    def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
-        own = [changes[i] for i in batch]
-        return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], own, level)], axis=1) if any(own) else state
-
-    def two_bodies(own: list[Bodies], state: np.ndarray, batch: list[int], level: int) -> np.ndarray:
-        if not chosen.bodies or net.silent:
-            return state
-        return np.where(mask[batch], state, _two_bodies(prior, net, own, state, level))
-
-    def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
-        own = [bodies[row // 2] for row in batch.rows[::2]]
-        own = [deepcopy(one) for one in own] if batch.trial else own
-        guided = relative_pose_guidance(
+    changed = _Changed(prior, net, chosen, changes, frozen, mask, meetings)
+    guidance = chosen.guidance if any(prompt.strip() for prompt in prompts) else 1.0
+    how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=guidance)
+    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise, slots=1)
+    view = View(lambda states: net.pairs(states).places().astype(np.float64), people=2)
+    made = dict(
+        sample(
             prior,
-            net,
-            net.bind(batch.cond),
-            seeds=batch.seeds,
-            mask=mask[batch.rows],
-            frozen=[frozen[i] for i in batch.rows],
-            weight=chosen.pair_guidance,
+            asked,
+            how,
+            network=net,
+            edits=[changed],
+            settled=True,
+            observed=given.observed,
+            progress=progress,
+            view=view,
+        )
+    )
+    return net.pairs(np.stack([made[row] for row in range(rows)]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Changed:
+    """Estimates of rows, changed by their corrections, by what the block says of them later on, and as bodies."""
+
+    prior: Prior
+    net: PairSession
+    sampling: PairSampling
+    changes: Sequence[Correction | None]
+    frozen: Sequence[bool]
+    mask: np.ndarray
+    """(rows, 1 + frames, 263) True where states are known."""
+    meetings: Sequence[Meeting | None]
+    """Of each pair; what is found of one in its rows is kept there."""
+
+    def __call__(self, denoise: Denoiser, batch: Batch) -> Denoiser:
+        """The denoiser of some rows, changed; an edit of `sample`."""
+        rows, prior, net = batch.rows, self.prior, self.net
+        mask, frozen, own = self.mask[rows], [self.frozen[i] for i in rows], [self.changes[i] for i in rows]
+        meetings = [self.meetings[row // 2] for row in rows[::2]]
+        meetings = [deepcopy(one) for one in meetings] if batch.trial else meetings
+        bodies = [Bodies.of(*one) for one in zip(people(mask), people(np.array(frozen)), meetings, strict=True)]
+        weight = self.sampling.pair_guidance
+        guide = relative_pose_guidance(
+            prior, net, net.bind(batch.cond), seeds=batch.seeds, mask=mask, frozen=frozen, weight=weight
         )
 
         def changed(state: np.ndarray, level: int) -> np.ndarray:
-            led = guided(state, corrected(denoise(state, level), batch.rows, level), level)
-            return two_bodies(own, led, batch.rows, level)
+            clean = denoise(state, level)
+            if any(own):
+                clean = np.concatenate([clean[:, :1], corrected_rows(clean[:, 1:], own, level)], axis=1)
+            clean = guide(state, clean, level) if level else clean
+            if not self.sampling.bodies or net.silent:
+                return clean
+            pairs = zip(bodies, people(clean), strict=True)
+            made = [one.edit(prior, net.places, pair, level)[0] for one, pair in pairs]
+            return np.where(mask, clean, np.concatenate(made))
 
         return changed
-
-    guidance = chosen.guidance if any(prompt.strip() for prompt in prompts) else 1.0
-    how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=guidance)
-    asked, view = Rows(prompts, [1 + frames] * rows, seeds, pair_noise), _view(prior, net)
-    walk = sample(prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=view)
-    made = dict(walk)
-    state = np.stack([made[row] for row in range(rows)])
-    state = np.concatenate([state[:, :1], prior.smoothed(state[:, 1:])], axis=1)
-    if given.observed is not None:
-        state = np.where(mask, given.observed.values, state)
-    places, motion = part(two_bodies(bodies, corrected(state, range(rows), 0), list(range(rows)), 0))
-    return people(motion * prior.std + prior.mean), net.places.decode(people(places))
-
-
-def _two_bodies(prior: Prior, net: PairSession, bodies: list[Bodies], state: np.ndarray, level: int) -> np.ndarray:
-    """Denoised states (2 * pairs, 1 + frames, 263), those of each pair changed as `Bodies.edit` does."""
-    places, motion = (people(each).copy() for each in part(state))
-    for i, one in enumerate(bodies):
-        poses = net.places.decode(places[i])
-        motion[i], places[i], _ = one.edit(prior, net.places, motion[i], places[i], poses, level=level)
-    return join(places.reshape(-1, PLACE), motion.reshape(-1, *motion.shape[2:]))
-
-
-def _view(prior: Prior, net: PairSession) -> View:
-    """Two rows to a motion, in the world of the first person."""
-
-    def poses(states: np.ndarray) -> Array:
-        places, motion = part(states)
-        ground = net.places.decode(people(places))
-        return two.decode(people(motion * prior.std + prior.mean), ground).astype(np.float64)
-
-    return View(poses, people=2)
 
 
 def pair_noise(seeds: Sequence[int]) -> NoiseSource:
@@ -185,33 +168,6 @@ def person_seeds(seed: Seed, number: int) -> tuple[int, int]:
 def pair_seeds(sampling: PairSampling) -> list[int]:
     """One seed per row of as many duets as are to be made."""
     return [seed for number in sampling.numbers() for seed in person_seeds(sampling.seed, number)]
-
-
-def known_state(prior: Prior, net: PairSession, features: np.ndarray, poses: np.ndarray, frames: int) -> Observed:
-    """A state (2, 1 + frames, 263) in which the first frames of two people are known, and their ground poses.
-
-    features: (2, known frames, 263), not standardised; poses: (2, 4). The network sees them without noise.
-    """
-    motion = (features.astype(np.float32) - prior.mean) / prior.spread
-    places = net.places.encode(poses.astype(np.float32))
-    state = join(places, lengthened(motion, frames))
-    mask = np.zeros(state.shape, np.bool_)
-    mask[:, : 1 + motion.shape[1]] = True
-    return Observed(state, mask, noise_free=True)
-
-
-def known_places(net: PairSession, poses: np.ndarray, frames: int) -> Observed:
-    """A state (2, 1 + frames, 263) in which only the ground poses (2, 4) of two people at frame 0 are known."""
-    state = join(net.places.encode(poses.astype(np.float32)), np.zeros((2, frames, WIDTH), np.float32))
-    mask = np.zeros(state.shape, np.bool_)
-    mask[:, 0] = True
-    return Observed(state, mask, noise_free=True)
-
-
-def stacked(pairs: Sequence[Observed]) -> Observed:
-    """What is known of several pairs."""
-    values, masks = (np.concatenate(parts) for parts in zip(*((one.values, one.mask) for one in pairs), strict=True))
-    return replace(pairs[0], values=values, mask=masks)
 
 
 def meetings_of(prompts: tuple[str, str], sampling: PairSampling) -> list[Meeting | None]:
@@ -259,34 +215,21 @@ def generate_pair(
     frames = _goal_frames(goals) if goal else frames_in(seconds, prior.fps)
     starts = [start_of(one) if one else GroundPose() for one in goals]
     change = [toward(one.seen_from(start), prior) if one else None for one, start in zip(goals, starts, strict=True)]
-    person = 0 if goals[0] or not goals[1] else 1
-    net = block.net(prior)
-    observed = known_places(net, np.stack([start.numbers() for start in starts]), frames) if all(goals) else None
+    person, net = 0 if goals[0] or not goals[1] else 1, block.net(prior)
     count, meetings = chosen.number(), meetings_of(said, chosen)
-    features, poses = pair_features(
-        prior,
-        net,
-        said * count,
-        frames,
-        seeds=pair_seeds(chosen),
-        edits=PairEdits(stacked([observed] * count) if observed else None, change * count, meetings=meetings),
-        sampling=chosen,
-        progress=progress,
+    begun = PairMotion(np.zeros((2, 0, WIDTH)), np.stack([start.numbers() for start in starts]))
+    known = known_state(net, PairMotion.stack([begun] * count), frames) if all(goals) else None
+    edits = PairEdits(known, change * count, meetings=meetings)
+    sampled = pair_features(
+        prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
     )
     made = []
-    for numbers, beside, meeting in zip(features, poses.astype(np.float64), meetings, strict=True):
-        if goal:
-            beside = poses_at(beside, starts[person], person)
-        people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
-        duet = [moved(one, GroundPose.of_numbers(pose)) for one, pose in zip(people, beside, strict=True)]
+    for one, meeting in zip(sampled.each(), meetings, strict=True):
+        one = one.moved_to(starts[person].numbers(), person) if goal else one
+        duet = [finish_person(prior, one, i, foot_lock=foot_lock) for i in (0, 1)]
         duet = [fit(one, goal) if goal else one for one, goal in zip(duet, goals, strict=True)]
         made.append(met(duet, meeting, goals) if chosen.bodies else (duet[0], duet[1]))
     return made
-
-
-def poses_at(poses: Array, place: GroundPose, person: int) -> Array:
-    """Ground poses (2, 4) moved rigidly on the ground so that that of ``person`` is ``place``."""
-    return compose(place.numbers(), relative(poses[person], poses))
 
 
 def _goal_frames(goals: Sequence[Goal | None]) -> int:
@@ -352,72 +295,17 @@ def complete_pair(
     check_pair(prior, count=chosen.number(), seconds=seconds)
     if not 0 < seconds <= LONGEST:
         raise MotionloomError(f"two people cannot go on for {seconds:g} s; ask for more than 0 and at most {LONGEST:g}")
-    ground, added = Ground.of(past), max(round(seconds * past[0].fps), 1)
-    known, poses, floors = ground.encoded()
-    seen = known.shape[1]
-    frames = seen + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
+    pasts, added = Pasts.of(past), max(round(seconds * past[0].fps), 1)
+    frames = pasts.known.features.shape[-2] + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
     net, count = block.net(prior), chosen.number()
-    observed = known_state(prior, net, known, poses, frames)
-    leaving = [Past(one, GroundPose()).holder(prior, frames) for one in known]
+    leaving = [Past(one, GroundPose()).holder(prior, frames) for one in pasts.known.features]
     edits = PairEdits(
-        stacked([observed] * count), leaving * count, frozen=[False] * (2 * count), meetings=meetings_of(said, chosen)
+        known_state(net, PairMotion.stack([pasts.known] * count), frames),
+        leaving * count,
+        frozen=[False] * (2 * count),
+        meetings=meetings_of(said, chosen),
     )
-    features, _ = pair_features(
+    sampled = pair_features(
         prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
     )
-    made = []
-    for numbers in features.astype(np.float64):
-        places = two.decode(numbers, poses) + floors[:, None, None, None] * np.array([0.0, 1.0, 0.0])
-        contacts = numbers[..., LAYOUT["contacts"]]
-        duet = [ground.behind(i, places[i], contacts[i], seen, added, foot_lock=foot_lock) for i in (0, 1)]
-        made.append((duet[0], duet[1]))
-    return made
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """Two people's own motions and the one ground on which both are uniform people (`data.pairs`)."""
-
-    motions: Duet
-    tails: Duet
-    """Their last seconds."""
-    legs: tuple[float, float]
-    """Metres."""
-
-    @staticmethod
-    def of(motions: Duet) -> "Ground":
-        """Raises `MotionloomError` as `data.pairs.together` does."""
-        first, second = motions
-        alike = len(first) == len(second) and abs(first.fps - second.fps) <= 1e-3 * first.fps
-        count = round(CONTEXT * first.fps) + 2 if alike else max(len(first), len(second))
-        tails = tuple(motion.frames(max(len(motion) - count, 0), len(motion)) for motion in motions)
-        together(tails[0], tails[1], name="the past of the two")
-        legs = [read_body(motion.skeleton).leg for motion in motions]
-        return Ground(motions, (tails[0], tails[1]), (legs[0], legs[1]))
-
-    def encoded(self) -> two.Encoded:
-        """The last frames at 20 per second, up to `SEEN`; the last is the motions' last, and goes straight on."""
-        count, fps = len(self.tails[0]), self.tails[0].fps
-        seen = min(int((count - 1) / fps * FPS + 1e-6) + 1, SEEN)
-        at = count - 1 - np.arange(seen)[::-1] / FPS * fps
-        uniform = one_world([to_smpl22(tail).positions() for tail in self.tails], self.legs)
-        places = np.stack([positions_at(person, at) for person in uniform])
-        return two.encode(np.concatenate([places, 2 * places[:, -1:] - places[:, -2:-1]], axis=1))
-
-    def own(self, person: int, places: Array) -> Array:
-        """Places (frames, 22, 3) on the common ground as the uniform person that ``person`` alone is: `one_world`
-        undone."""
-        ratio = float(np.mean(self.legs)) / self.legs[person]
-        return places + (ratio - 1.0) * places[:, :1] * np.array([1.0, 0.0, 1.0])
-
-    def behind(self, person: int, places: Array, contacts: Array, seen: int, added: int, *, foot_lock: bool) -> Motion:
-        """The person's motion with ``added`` frames more: places (frames, 22, 3) at 20 per second on the common
-        ground, contacts (frames, 4); frame ``seen - 1`` is the motion's last."""
-        motion = self.motions[person]
-        shown = int((seen - 1) / FPS * motion.fps + 1e-6) + 1
-        tail = motion.frames(len(motion) - shown, len(motion))
-        at = (np.arange(shown + max(added, LEAST)) - (shown - 1)) / motion.fps * FPS + seen - 1
-        nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
-        sampled = positions_at(self.own(person, places), at)
-        new = continued(tail, sampled, contacts=contacts[nearest], foot_lock=foot_lock)
-        return concatenated(motion, new.frames(0, added))
+    return [pasts.continued(one, added, foot_lock=foot_lock) for one in sampled.each()]

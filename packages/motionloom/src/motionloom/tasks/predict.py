@@ -76,7 +76,7 @@ def predict(
     """
     chosen = PredictionSampling.of(sampling, settings)
     count = chosen.number(FUTURES)
-    _check(predictor, past, seconds, count=count, sampling=chosen, longest=WHOLE)
+    _check(predictor, past.fps, seconds, count=count, sampling=chosen, longest=WHOLE)
     seen = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
     parts = given(predictor, seen, hold, seconds) if hold else None
@@ -112,7 +112,7 @@ def predict_pieces(
     The arguments and errors are those of `predict`; a day is the longest.
     """
     chosen = PredictionSampling.of(sampling, settings).alone()
-    _check(predictor, past, seconds, count=1, sampling=chosen, longest=DAY)
+    _check(predictor, past.fps, seconds, count=1, sampling=chosen, longest=DAY)
     seen = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
     parts = given(predictor, seen, hold, seconds) if hold else None
@@ -154,7 +154,7 @@ def switch(
     """
     chosen = PredictionSampling.of(sampling, settings)
     chosen = replace(chosen, count=chosen.number())
-    _check(predictor, past, seconds, count=chosen.number(), sampling=chosen, longest=WHOLE)
+    _check(predictor, past.fps, seconds, count=chosen.number(), sampling=chosen, longest=WHOLE)
     check_like(past, target, "target")
     if facing not in ("turned", "kept"):
         raise MotionloomError(f"facing is 'turned' or 'kept'; got {facing!r}")
@@ -199,8 +199,8 @@ def _arriving(
     grid = positions_at(np.concatenate([person, places]), times)
     made = apply_positions(grid, pads, foot_lock=foot_lock, known=len(tail))
     first = len(tail) + gap
-    begin, to = standing(target, 0)[0], standing(made, first)[0]
-    moved = carried_level(target, rot.rotvec_to_quat(np.array([0.0, turn, 0.0])), begin, to)
+    begin = standing(target, 0)
+    moved = carried_level(target, begin, replace(standing(made, first), facing=begin.facing + turn))
     window = concatenated(tail, pads.frames(len(tail), first), moved.frames(0, behind))
     spliced = splice(window, made, len(tail), last=first)
     return concatenated(past, spliced.frames(len(tail), first), moved)
@@ -239,7 +239,7 @@ def _on_past(
 
 
 def _check(
-    predictor: Predictor, past: Motion, seconds: float, *, count: int, sampling: PredictionSampling, longest: float
+    predictor: Predictor, fps: float, seconds: float, *, count: int, sampling: PredictionSampling, longest: float
 ) -> None:
     if not isinstance(predictor, Predictor):
         raise MotionloomError(f"motion is predicted by a Predictor; got a {type(predictor).__name__}: load one")
@@ -248,11 +248,9 @@ def _check(
             f"this predictor sees {predictor.layout.joints} joints of a benchmark's skeleton; motions of users need "
             "one that sees the 22 joints and their way, such as the shipped one"
         )
-    if len(past) < 2:
-        raise MotionloomError(f"the past has {len(past)} frame; at least 2 are needed to see how it moves")
-    if not (np.isfinite(seconds) and 0 < seconds <= longest) or round(seconds * past.fps) < 1:
+    if not (np.isfinite(seconds) and 0 < seconds <= longest) or round(seconds * fps) < 1:
         raise MotionloomError(
-            f"cannot predict {seconds:g} s; ask for at least a frame ({1 / past.fps:.3g} s) and at most {longest:g} s"
+            f"cannot predict {seconds:g} s; ask for at least a frame ({1 / fps:.3g} s) and at most {longest:g} s"
         )
     if count * seconds > MOST:
         raise MotionloomError(

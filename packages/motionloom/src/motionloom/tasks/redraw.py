@@ -18,21 +18,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from motionloom import rotations as rot
 from motionloom.edits.fitting import fit
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.features.layout import LAYOUT
+from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
-from motionloom.ground import GroundPose
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion, ground_pose
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.body import Places, strung
-from motionloom.tasks.long import LOOK_BACK, Past, Track, decoded, in_world, long_features
+from motionloom.tasks.long import LOOK_BACK, Past, Track, in_world, long_features
 from motionloom.tasks.sampling import Moves
-from motionloom.tasks.splice import carried, concatenated, splice
+from motionloom.tasks.splice import carried_level, concatenated, splice
 from motionloom.weights.prior import Prior
 
 
@@ -215,17 +213,12 @@ def _margins(run: Run, old: Sequence[Block], new: Sequence[Block]) -> tuple[int,
 def _beside(old: Motion, at: _Stretch) -> Past:
     """The old frames on either side of what is sampled, as the network sees them."""
     before, behind = min(LOOK_BACK, at.first), min(LOOK_BACK, len(old) - 1 - at.end)
-    place, known = GroundPose(), np.zeros((0, WIDTH), np.float32)
+    known, comes = PlacedMotion.nothing(), None
     if before:
-        positions = old.frames(at.first - before, at.first + 1).positions()
-        begin = ground_pose(positions[0])
-        known = humanml.encode(begin.from_world(positions))
-        place = decoded(known.astype(np.float64), begin)[1]
-    comes = None
+        known = PlacedMotion.of(old.frames(at.first - before, at.first + 1).positions())
     if behind > 0:
-        positions = old.frames(at.end, at.end + behind + 1).positions()
-        comes = humanml.encode(ground_pose(positions[0]).from_world(positions))
-    return Past(known, place, comes, at.lead, at.trail)
+        comes = PlacedMotion.of(old.frames(at.end, at.end + behind + 1).positions()).features
+    return Past(known.features, known.end, comes, at.lead, at.trail)
 
 
 # One run
@@ -266,7 +259,7 @@ def _put_in(timed: Timed, old: Motion, at: _Stretch, past: Past, made: Places) -
     if past.behind is not None:
         if timed.track is None:
             here, to = ground_pose(behind[0].frames(0, 1).positions()[0]), ground_pose(made.positions[-1])
-            behind = [_carried(behind[0], here, to)]
+            behind = [carried_level(behind[0], here, to)]
         made = made.crop(0, len(made) - 1)
         beside = [behind[0].frames(0, len(past.behind))]
     first, end = len(past.known), len(past.known) + len(made)
@@ -296,9 +289,3 @@ def _backwards(motion: Motion) -> Motion:
 def _as_they_are(motion: Motion, known: np.ndarray | None) -> Places:
     assert known is not None
     return Places(motion.positions(), known[:, LAYOUT["contacts"]].astype(np.float64), Goal.nothing(len(motion)))
-
-
-def _carried(motion: Motion, here: GroundPose, to: GroundPose) -> Motion:
-    """The motion moved along the floor so that one ground pose becomes another."""
-    turn = rot.rotvec_to_quat(np.array([0.0, to.facing - here.facing, 0.0]))
-    return carried(motion, turn, np.array([here.x, 0.0, here.z]), np.array([to.x, 0.0, to.z]))

@@ -46,10 +46,12 @@ class Rows:
     prompts: Sequence[str]
     """An empty one asks for nothing in particular."""
     lengths: Sequence[int]
-    """Tokens: frames, and one more for two people."""
+    """Tokens: frames, and the slots before them."""
     seeds: Sequence[int]
     noise: Callable[[Sequence[int]], NoiseSource] = row_noise
     """From seeds to the noise of their rows."""
+    slots: int = 0
+    """Tokens before the frames: 1 for two people."""
     patch: int = 1
     """Lengths that differ by less share a call: that many frames are a token of the network, so that little is computed
     for padding. A row's sums are made in the same order whatever is beside it (docs/decisions/0020-bulk.md)."""
@@ -108,6 +110,7 @@ def sample(
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
     halfway: bool = False,
+    settled: bool = False,
     progress: Progress | None = None,
     view: View | None = None,
 ) -> Iterator[tuple[int, State]]:
@@ -116,7 +119,9 @@ def sample(
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. guided: the guided
     denoiser of all rows, where it is not that of the network alone. edits: of each
     batch's guided denoiser, after what is observed was put in, the first one first. halfway: stop after half of the
-    calls and give the denoised estimates. view: how each network call is seen by who is `watching`; None: nobody can.
+    calls and give the denoised estimates. settled: rows of one length are given `Prior.smoothed`, with what is observed
+    in its place, and through the edits once more, at level 0. view: how each network call is seen by who is `watching`;
+    None: nobody can.
     Where the sampling asks for the best of several, each motion's seed is chosen first (`with_best_seeds`).
     Raises MotionloomError for more steps than the weights have levels.
     """
@@ -137,7 +142,8 @@ def sample(
         cond = prior.condition([rows.prompts[i] for i in numbers], padded)
         batch = Batch(numbers, cond, [rows.seeds[i] for i in numbers])
         noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
-        denoise, constrain = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.guidance), None
+        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.guidance)
+        denoise, constrain = _at_noise(base), None
         if observed is None:
             state = noise(np.empty((len(numbers), max(lengths), len(prior.mean)), np.float32))
         else:
@@ -159,7 +165,15 @@ def sample(
             state, done = snapshot.clean if halfway else snapshot.state, done + 1
             if progress:
                 progress(done, len(batches) * (len(way) - 1))
+        if settled and not halfway:
+            frames = prior.smoothed(state[:, rows.slots :])
+            state = denoise(np.concatenate([state[:, : rows.slots], frames], axis=1), 0)
         yield from ((number, one[:length]) for number, one, length in zip(numbers, state, lengths, strict=True))
+
+
+def _at_noise(denoise: Denoiser) -> Denoiser:
+    """The denoiser, for which a clean state is its own estimate."""
+    return lambda state, level: denoise(state, level) if level else state
 
 
 def _begun(prior: Prior, observed: Observed, level: int, noise: NoiseSource) -> tuple[State, Constraint]:
@@ -208,7 +222,7 @@ def with_best_seeds(
     for first in motions:
         own = range(first, first + people)
         states = np.stack([estimates[first * count + place] for place in range(count * people)])
-        states = states.reshape(count, people, *states.shape[1:])[:, :, people - 1 :]  # two have a slot before frame 0
+        states = states.reshape(count, people, *states.shape[1:])[:, :, rows.slots :]
         number = best(prior, [rows.prompts[row] for row in own], states, seeds=tried[first], level=level)
         chosen[first : first + people] = [tried[row][number] for row in own]
     return replace(rows, seeds=chosen)

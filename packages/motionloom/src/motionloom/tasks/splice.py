@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.blending import smoothstep
 from motionloom.edits.boundary import match_boundary, match_rotations
-from motionloom.features.humanml import resample_positions
+from motionloom.features.humanml import positions_at, resample_positions
 from motionloom.features.layout import FPS
+from motionloom.features.placed import PlacedMotion
+from motionloom.ground import GroundPose
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
@@ -21,7 +23,6 @@ from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.onto import match_root, onto, place_of, with_place
 from motionloom.skeleton import Skeleton
-from motionloom.tasks.inpaint import Inpainted
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -71,7 +72,12 @@ def person_at_20(motion: Motion) -> Array:
     return resample_positions(np.concatenate([places, ahead]), motion.fps)[: frames + 1]
 
 
-def apply_sample(sample: Inpainted, old: Motion, *, foot_lock: bool) -> Motion:
+def person_at(motion: Motion, at: np.ndarray) -> Array:
+    """(len(at), 22, 3) metres: the uniform person at fractional frames of a motion of two frames or more."""
+    return positions_at(to_smpl22(motion).positions(), at)
+
+
+def apply_sample(sample: PlacedMotion, old: Motion, *, foot_lock: bool) -> Motion:
     """What was sampled, on the old motion's skeleton, at its rate and length, over its floor; feet cleaned."""
     places = resample_positions(sample.positions, FPS, target=old.fps)[: len(old)]
     nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(sample.contacts) - 1)
@@ -146,17 +152,19 @@ def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
     return replace(motion, root=rot.rotate(turn, motion.root - about) + to, rotations=rotations)
 
 
-def carried_level(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
-    """The same along the floor, the path carried by the same joint as before (`match_root`)."""
-    return match_root(motion, carried(motion, turn, about, to * [1, 0, 1] + about * [0, 1, 0]))
+def carried_level(motion: Motion, here: GroundPose, there: GroundPose) -> Motion:
+    """The motion moved along the floor so that one ground pose becomes another, the path carried by the same joint as
+    before (`match_root`)."""
+    turn = rot.rotvec_to_quat(np.array([0.0, there.facing - here.facing, 0.0]))
+    about, to = np.array([here.x, 0.0, here.z]), np.array([there.x, 0.0, there.z])
+    return match_root(motion, carried(motion, turn, about, to))
 
 
-def standing(motion: Motion, frame: int) -> tuple[Array, Array]:
-    """Place (3,) of the middle of the hips in a frame and the turn (4,) about +Y of the way they face."""
+def standing(motion: Motion, frame: int) -> GroundPose:
+    """The ground pose of the hips in a frame."""
     places = joints22(motion.frames(frame, frame + 1))[0]
     across = places[1] - places[2]
-    turn = rot.rotvec_to_quat(np.array([0.0, np.arctan2(-across[2], across[0]), 0.0]))
-    return (places[1] + places[2]) / 2, turn
+    return GroundPose.of((places[1] + places[2]) / 2, float(np.arctan2(-across[2], across[0])))
 
 
 def concatenated(*parts: Motion) -> Motion:

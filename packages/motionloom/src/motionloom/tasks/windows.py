@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
 from motionloom.diffusion import row_seed
-from motionloom.features.humanml import positions_at
+from motionloom.errors import MotionloomError
 from motionloom.kinematics.feet import envelope
 from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
-from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import Known, next_frames
+from motionloom.tasks.splice import person_at
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -44,12 +44,14 @@ class Past:
 
     @staticmethod
     def of(predictor: Predictor, motion: Motion) -> "Past":
-        """Of a clip of two frames or more."""
+        """Raises MotionloomError for a clip of less than two frames."""
+        if len(motion) < 2:
+            raise MotionloomError(f"the past has {len(motion)} frame; at least 2 are needed to see how it moves")
         seconds = max(CONTEXT, predictor.observed / predictor.fps)
         context = motion.frames(max(len(motion) - round(seconds * motion.fps) - 2, 0), len(motion))
         whole = int((len(motion) - 1) / motion.fps * predictor.fps + 1e-6) + 1
         back = np.arange(min(max(whole, 2), predictor.observed))[::-1] / predictor.fps * motion.fps
-        person = positions_at(to_smpl22(context).positions(), len(context) - 1 - back)
+        person = person_at(context, len(context) - 1 - back)
         seen = max(int(back[0] + 1e-6) + 1, 2)
         tail = motion.frames(max(len(motion) - seen, 0), len(motion))
         return Past(motion, tail, person, predictor.fps / motion.fps, predictor.observed)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
 from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
@@ -23,7 +22,6 @@ from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import Sampling
 from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
 from motionloom.server.mmcp.rigs import Rig, read_rig
-from motionloom.tasks.control import moved
 from motionloom.tasks.run import Models, Plan, run, run_each
 from motionloom.tasks.splice import carried_level, concatenated, standing
 from motionloom.tasks.worded import read
@@ -183,7 +181,7 @@ def _steered(sampler: _Sampler, segments: list[Segment], goal: Goal, seed: int) 
     if len(segments) == 1:
         place = start_of(goal)
         (only,) = segments
-        return moved(sampler.compose([replace(only, goal=goal.seen_from(place))], seed), place)
+        return sampler.compose([replace(only, goal=goal.seen_from(place))], seed).placed(place)
     if goal.asked[:, 0, [0, 2]].all(axis=-1).any():
         return sampler.compose(segments, seed, whole_path(goal))
     return fit(sampler.compose(segments, seed), goal)
@@ -254,8 +252,7 @@ def _performance(sampler: _Sampler, segment: Any, rig: Rig, frames: int, seed: i
 
 
 def _joined(sampler: _Sampler, before: Motion, behind: Motion, seed: int) -> Motion:
-    (end, facing), (begin, faced) = standing(before, len(before) - 1), standing(behind, 0)
-    behind = carried_level(behind, rot.multiply(facing, rot.inverse(faced)), begin, end)
+    behind = carried_level(behind, standing(behind, 0), standing(before, len(before) - 1))
     seam = before.seconds
     whole = concatenated(before, behind)
     around = min(SEAM, before.seconds / 2, behind.seconds / 2)
