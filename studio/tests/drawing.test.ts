@@ -26,7 +26,9 @@ class Jobs {
       return Response.json({ id: String(this.asked.length - 1) });
     }
     if (path.startsWith("motions/"))
-      return new Response(new Float32Array(130 * POSE), { headers: { "Motion-Fps": "20", "Motion-People": "1" } });
+      return new Response(new Float32Array(130 * (POSE + 3)), {
+        headers: { "Motion-Fps": "20", "Motion-People": "1" },
+      });
     if (!path.endsWith("/events")) return Response.json({});
     const body = new ReadableStream<Uint8Array>({ start: (one) => void this.streams.push(one) });
     init.signal?.addEventListener("abort", () => this.streams.at(-1)!.error(init.signal!.reason));
@@ -226,10 +228,13 @@ describe("a part of a clip", () => {
   it("lies in the clip at its time, for one of its people, and makes it no longer", () => {
     const people = [new Float32Array(80 * POSE), new Float32Array(80 * POSE)];
     const part = motionClip(20, [new Float32Array(20 * POSE).fill(1)]);
-    const clip = overlaid(motionClip(40, people), part, 1, 1.5);
+    const looks = people.map(() => new Float32Array(80 * 3).fill(1));
+    const clip = overlaid(motionClip(40, people, looks), part, 1, 1.5);
     const heights = (who: number) => Array.from({ length: 80 }, (_, n) => jointAt(clip, who, 0, n / 40)[1]);
     expect(heights(0).every((one) => one === 0)).toBe(true);
     expect(heights(1).indexOf(1)).toBe(60);
+    // Where the head looks there is not known.
+    expect(clip.looks!.map((one) => one.indexOf(0))).toEqual([-1, 180]);
     expect(clip.frames).toBe(80);
     expect(people[1]!.every((one) => one === 0)).toBe(true);
   });

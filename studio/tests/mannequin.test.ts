@@ -25,6 +25,15 @@ function meshes(figure: Mannequin): Mesh<BufferGeometry>[] {
   return found;
 }
 
+/** The middle of the face, from the joint of the head. */
+function face(figure: Mannequin): Vector3 {
+  const [, found] = meshes(figure).filter((one) => one.parent === meshes(figure).at(-8)!.parent);
+  return new Box3()
+    .setFromObject(found!, true)
+    .getCenter(new Vector3())
+    .sub(new Vector3(...PLACES[HEAD]!));
+}
+
 describe("the mannequin", () => {
   it("stands on the floor with its soles flat, and is as tall as a person", () => {
     const box = new Box3().setFromObject(posed(PLACES).group, true);
@@ -36,15 +45,45 @@ describe("the mannequin", () => {
 
   it("looks where it faces, with thumbs in front and palms inwards", () => {
     const figure = posed(PLACES);
-    const [, face] = meshes(figure).filter((one) => one.parent === meshes(figure).at(-8)!.parent);
-    const middle = new Box3().setFromObject(face!, true).getCenter(new Vector3());
-    expect(middle.z).toBeGreaterThan(PLACES[HEAD]![2] + 0.04);
+    expect(face(figure).z).toBeGreaterThan(0.04);
     const hands = figure.group.children.filter((one) => one.children.length === 2).slice(1);
     [LEFT, RIGHT].forEach(({ wrist }, n) => {
       const [hand, thumb] = hands[n]!.children.map((one) => new Box3().setFromObject(one, true));
       expect(thumb!.max.z).toBeGreaterThan(hand!.max.z);
       // The fingers bend to the palm, which is to the thigh.
       expect(Math.abs(hand!.getCenter(new Vector3()).x)).toBeLessThan(Math.abs(PLACES[wrist]![0]) + 0.012);
+    });
+  });
+
+  it("turns its face where the head looks, and to the front without that", () => {
+    const figure = posed(PLACES);
+    const turned = (look: readonly number[] | null) => {
+      figure.pose(PLACES.flat(), look);
+      figure.group.updateMatrixWorld(true);
+      return face(figure);
+    };
+    const [front, left, down] = [turned(null), turned([0.8, 0, 0.6]), turned([0, -0.6, 0.8])];
+    expect(Math.abs(front.x)).toBeLessThan(0.002);
+    expect(left.x).toBeGreaterThan(0.03);
+    expect(left.y).toBeCloseTo(front.y, 1);
+    expect(down.y).toBeLessThan(front.y - 0.02);
+    expect(Math.abs(down.x)).toBeLessThan(0.002);
+    expect(turned(null).distanceTo(front)).toBeLessThan(1e-6);
+  });
+
+  it("has round shoulders that slope to the neck where arms hang down", () => {
+    const arms = meshes(posed(PLACES)).filter((_, n) => n === 2 || n === 4);
+    arms.forEach(({ geometry }, n) => {
+      const [shoulder, places] = [
+        new Vector3(...PLACES[[LEFT, RIGHT][n]!.shoulder]!),
+        geometry.getAttribute("position"),
+      ];
+      const all = Array.from({ length: places.count }, (_, k) => new Vector3().fromBufferAttribute(places, k));
+      const top = all.reduce((one, other) => (other.y > one.y ? other : one));
+      expect(Math.abs(top.x)).toBeLessThan(Math.abs(shoulder.x) - 0.02);
+      const around = all.filter((one) => one.y < shoulder.y - 0.02 && one.y > shoulder.y - 0.08);
+      const depths = around.map((one) => one.z);
+      expect(Math.max(...depths) - Math.min(...depths)).toBeGreaterThan(0.114);
     });
   });
 
@@ -63,15 +102,22 @@ describe("the mannequin", () => {
   });
 
   it("turns its skin outwards", () => {
-    for (const { geometry, scale } of meshes(posed(PLACES)).slice(0, 6)) {
-      const [places, normals] = [geometry.getAttribute("position"), geometry.getAttribute("normal")];
-      const middle = new Box3().setFromBufferAttribute(places as never).getCenter(new Vector3());
-      let outwards = 0;
-      for (let n = 0; n < places.count; n += 1) {
-        const out = new Vector3().fromBufferAttribute(places, n).sub(middle);
-        outwards += Math.sign(out.dot(new Vector3().fromBufferAttribute(normals, n)));
+    for (const { geometry } of meshes(posed(PLACES)).slice(0, 6)) {
+      const [places, normals, index] = [
+        geometry.getAttribute("position"),
+        geometry.getAttribute("normal"),
+        geometry.index!,
+      ];
+      let [volume, outwards] = [0, 0];
+      for (let n = 0; n < index.count; n += 3) {
+        const corners = [0, 1, 2].map((k) => new Vector3().fromBufferAttribute(places, index.getX(n + k)));
+        const [a, b, c] = corners as [Vector3, Vector3, Vector3];
+        volume += a.dot(b.clone().cross(c)) / 6;
+        const out = b.clone().sub(a).cross(c.clone().sub(a));
+        outwards += Math.sign(out.dot(new Vector3().fromBufferAttribute(normals, index.getX(n))));
       }
-      expect(outwards * scale.z).toBeGreaterThan(places.count * 0.6);
+      expect(volume).toBeGreaterThan(0.001);
+      expect(outwards).toBeGreaterThan((index.count / 3) * 0.85);
     }
   });
 });

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { type MotionClip, jointAt, motionClip, poseAt, vec } from "../src/body/clip";
+import { type MotionClip, jointAt, lookAt, motionClip, poseAt, vec } from "../src/body/clip";
 import { reach } from "../src/body/reach";
 import { LEFT, PARENTS, RIGHT } from "../src/body/skeleton";
 import { isUnmet, targetLift, targetMiss } from "../src/project/misses";
@@ -39,6 +39,15 @@ describe("a clip", () => {
     expect(poseAt(clip, 0, 0.025, out)[0]).toBeCloseTo(0.5);
     expect(poseAt(clip, 0, -1, out)[0]).toBe(0);
     expect(poseAt(clip, 0, 9, out)[0]).toBe(1);
+  });
+
+  it("says where the head looks, between frames as well, where that is known", () => {
+    const people = [new Float32Array(3 * 66)];
+    const clip = motionClip(20, people, [Float32Array.of(0, 0, 1, 1, 0, 0, 0, 0, 0)]);
+    const out = new Float32Array(3);
+    expect([...lookAt(clip, 0, 0.025, out)!]).toEqual([0.5, 0, 0.5]);
+    expect(lookAt(clip, 0, 0.1, out)).toBeNull();
+    expect(lookAt(motionClip(20, people), 0, 0, out)).toBeNull();
   });
 });
 

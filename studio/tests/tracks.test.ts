@@ -4,7 +4,7 @@ import { type Project, type Take, exampleProject } from "../src/project/model";
 import { plan } from "../src/project/plan";
 import { settled } from "../src/project/settled";
 import { freeze, setPeople } from "../src/project/timeline";
-import { PARTS, addTrack, changeTrack, shiftTrack, trackCommands, trackKeys } from "../src/project/tracks";
+import { PARTS, addTrack, changeTrack, shiftTrack, trackCommands, trackKeys, trackSaid } from "../src/project/tracks";
 
 const TAKE: Take = { motion: "old", seed: 1, seconds: 6.5, people: 1, how: "drawn" };
 
@@ -54,8 +54,21 @@ describe("a part with words of its own", () => {
     expect(edit(other)).toBeUndefined();
     expect(edit(setPeople(other, 2))).toMatchObject({ look_at: 1, person: 0 });
     expect(trackCommands(looks, "a")).toEqual(["edit a.npz --look 1 1.5 2 --between 0 2 --seed 1 --out a_1.npz"]);
-    expect(() => trackCommands(changeTrack(waving(), 0, "t", { clip }), "a")).toThrow("are in no timeline file");
+    expect(trackCommands(changeTrack(waving(), 0, "t", { clip, part: "arms" }), "a")).toEqual([
+      "edit a.npz --source waves.npz --keep lower_body --keep torso --keep head_neck --between 1 3 --seed 1 --out a_1.npz",
+    ]);
+    expect(() => trackCommands(setPeople(other, 2), "a")).toThrow("parts of two people are in no timeline file");
     expect(read(written(other, { id: "a", revision: 1 }))).toEqual(other);
+  });
+
+  it("of the head says in words what it does, or looks somewhere", () => {
+    const nods = changeTrack(addTrack(exampleProject(), 0, [1, 3], "t"), 0, "t", { part: "head", text: "nods twice" });
+    expect(plan(nods).jobs[1]).toMatchObject({ prompt: "nods twice", keep: PARTS.head.keep, between: [[1, 3]] });
+    expect(trackSaid(nods.people[0]!.tracks[0]!)).toBe("nods twice");
+    const looks = changeTrack(nods, 0, "t", { look: [1, 1.5, 2] });
+    expect(plan(looks).jobs[1]).not.toHaveProperty("prompt");
+    expect(trackSaid(looks.people[0]!.tracks[0]!)).toBe("looks at a point");
+    expect(trackCommands(nods, "a")[0]).toContain("edit a.npz 'nods twice' --keep lower_body --keep torso");
   });
 
   it("is smoothed, the whole body or a part", () => {

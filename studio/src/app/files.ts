@@ -31,6 +31,8 @@ const ANEW =
 
 /** The same of parts that do something else than the blocks. */
 const PARTS = "# What single parts of the body do is laid over it, where it is written as NPZ, by:\n";
+/** And of clips that they follow. */
+const CLIPS = "# The NPZ of each --source is in the project folder, in motions.\n";
 
 export class Files {
   /** The skeleton that came last, for AMC files. */
@@ -85,6 +87,7 @@ export class Files {
       `# motionloom ${command(project, `${name}.yaml`)}\n`,
       isChanged ? ANEW : "",
       parts.length ? PARTS : "",
+      parts.some((one) => one.includes(" --source ")) ? CLIPS : "",
       ...parts.map((one) => `# motionloom ${one}\n`),
     ].join("");
     download(new Blob([head, yaml]), `${name}.yaml`);

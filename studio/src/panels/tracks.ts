@@ -26,6 +26,8 @@ const USUAL = 2;
 const WORDED: readonly Part[] = ["body", "legs"];
 /** Neither a clip nor smoothing. */
 const PLAIN = { clip: null, smooth: 0 } as const;
+/** What can be said of a head, which is turned by rules (`motionloom.goals.heads`). */
+const HEAD_WORDS = "What the head does: nods, shakes, looks left, right, up, down or around";
 /** Metres before somebody's eyes. */
 const AHEAD = 2;
 
@@ -92,7 +94,7 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
     });
   const { look } = track;
   const isPlain = !track.clip && !track.smooth;
-  const isWorded = track.part !== "head" && isPlain;
+  const isWorded = (track.part !== "head" || look === null) && isPlain;
   const isPoint = track.part === "head" && isPlain && look !== null && look !== OTHER;
   const notes = (keptTake(value)?.notes ?? []).filter((note) => note.text.trim() === track.text.trim());
   return section(
@@ -105,14 +107,17 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
         "aria-label": "Which part",
         onchange: (event: Event) => {
           const part = (event.target as HTMLSelectElement).value as Part;
-          const look = part === "head" ? (track.look ?? pointAhead(app, track.from)) : null;
+          const look = part === "head" ? track.look : null;
           change("choose a part", { part, look, clip: WORDED.includes(part) ? null : track.clip });
         },
       },
       ...ORDER.map((part) => h("option", { value: part, selected: part === track.part }, PARTS[part].name)),
     ),
     doingField(app, value, track, (part) => change("choose what a part does", part)),
-    isWorded && wordsArea("What this part does", track.id, track.text, (text) => change("write", { text }, true)),
+    isWorded &&
+      wordsArea(track.part === "head" ? HEAD_WORDS : "What this part does", track.id, track.text, (text) =>
+        change("write", { text }, true),
+      ),
     isPoint &&
       h(
         "div",
@@ -161,9 +166,16 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
 function doingField(app: App, project: Project, track: Track, change: (part: Partial<Track>) => void): HTMLElement {
   const isHead = track.part === "head";
   const isPlain = !track.clip && !track.smooth;
+  const isSaid = isPlain && (!isHead || track.look === null);
+  const words: [string, boolean, Partial<Track>] = ["Words", isSaid, { ...PLAIN, look: null }];
   const choices: [string, boolean, Partial<Track>][] = isHead
     ? [
-        ["Looks at a point", isPlain && track.look !== OTHER, { ...PLAIN, look: pointAhead(app, track.from) }],
+        words,
+        [
+          "Looks at a point",
+          isPlain && !isSaid && track.look !== OTHER,
+          { ...PLAIN, look: pointAhead(app, track.from) },
+        ],
         ...(project.people.length > 1
           ? [
               ["Looks at the other person", isPlain && track.look === OTHER, { ...PLAIN, look: OTHER }] as [
@@ -174,7 +186,7 @@ function doingField(app: App, project: Project, track: Track, change: (part: Par
             ]
           : []),
       ]
-    : [["Words", isPlain, PLAIN]];
+    : [words];
   const clips = [
     ...project.clips.filter((one) => one.motion !== track.clip?.motion),
     ...(track.clip ? [track.clip] : []),

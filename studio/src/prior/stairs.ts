@@ -99,14 +99,21 @@ function aboveFloor(body: Body): Body {
   return fitted(body, wanted);
 }
 
+/** Whether somebody is above the floor for longer than a jump takes, of the heights of the lowest joint. */
+export function isUp(low: readonly number[], fps: number): boolean {
+  return (
+    lasting(
+      low.map((y) => y > UP),
+      fps,
+    ).length > 0
+  );
+}
+
 /** The stairs that somebody goes up or down; null on the floor, and where the feet bear nowhere for a while. */
 export function stairs(places: readonly Vec[][], fps: number): Stairs | null {
+  if (!isUp(lowest(places), fps) || hovering(places, fps).length) return null;
   const holds = footholds(places, fps);
-  const isUp = lasting(
-    lowest(places).map((y) => y > UP),
-    fps,
-  ).length;
-  if (!isUp || hovering(places, fps).length || !holds.length) return null;
+  if (!holds.length) return null;
   const heights = holds.map(({ height }) => height);
   if (Math.max(...heights) - Math.min(...heights) < CLIMB) return null;
   const off = RISES.map((rise) => heights.reduce((sum, y) => sum + Math.abs(y - rise * rounded(y / rise)), 0));

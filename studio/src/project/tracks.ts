@@ -84,8 +84,8 @@ export function trackKey(who: number, { part, text, clip, look, smooth, from, un
 export function trackSaid({ part, text, clip, look, smooth }: Track): string {
   if (smooth) return `smoothed, ${smooth} s`;
   if (clip) return clip.name;
-  if (part !== "head") return text.trim();
-  return look === OTHER ? "looks at the other" : look ? "looks at a point" : "";
+  if (part !== "head" || !look) return text.trim();
+  return look === OTHER ? "looks at the other" : "looks at a point";
 }
 
 /** What an edit says of it; null: nothing is asked. */
@@ -93,9 +93,9 @@ function asked(project: Project, who: number, { part, text, clip, look, smooth }
   const { keep } = PARTS[part];
   if (smooth) return { smooth, keep };
   if (clip) return { source: clip.motion, keep };
-  if (part !== "head") return text.trim() ? { prompt: text.trim(), keep } : null;
+  if (part !== "head" || !look) return text.trim() ? { prompt: text.trim(), keep } : null;
   if (look === OTHER) return project.people.length > 1 ? { look_at: 1 - who } : null;
-  return look ? { look } : null;
+  return { look };
 }
 
 /**
@@ -124,14 +124,16 @@ export function trackJobs(
 /** What lays the tracks over the motion `NAME.npz` of a timeline file, as commands; the last one writes the whole. */
 export function trackCommands(project: Project, name: string): string[] {
   const jobs = trackJobs(project, length(project), null);
-  if (jobs.some((job) => job.source || job.person || job.look_at !== undefined))
-    throw new Error("parts that follow a clip, and those of two people, are in no timeline file; export the motion.");
-  return jobs.map(({ prompt, look, smooth, keep = [], between = [], seed }, index) => {
+  if (jobs.some((job) => job.person || job.look_at !== undefined))
+    throw new Error("parts of two people are in no timeline file; export the motion.");
+  return jobs.map(({ prompt, source, look, smooth, keep = [], between = [], seed }, index) => {
     const said = smooth
       ? ` --smooth ${smooth}`
       : look
         ? ` --look ${look.join(" ")}`
-        : ` '${prompt!.replaceAll("'", "'\\''")}'`;
+        : source
+          ? ` --source ${source}.npz`
+          : ` '${prompt!.replaceAll("'", "'\\''")}'`;
     const kept = keep.map((name) => ` --keep ${name}`).join("");
     const spans = between.map((span) => ` --between ${span.join(" ")}`).join("");
     const [old, next] = [index ? `${name}_${index}` : name, `${name}_${index + 1}`];

@@ -1,6 +1,6 @@
 /** What the server can be asked, with its answers as values of the page. */
 
-import { type MotionClip, motionClip } from "../body/clip";
+import { type MotionClip, POSE, motionClip } from "../body/clip";
 import { filed, stampOf } from "../project/file";
 import type { TimelineJson } from "../project/goals";
 import type { Note, Overlap, Project, Stamp, Take } from "../project/model";
@@ -69,23 +69,22 @@ const CACHED = 40;
 export function motion(id: string): Promise<MotionClip> {
   const known = cache.get(id);
   if (known) return known;
-  const asked = places(`motions/${encodeURIComponent(id)}`);
+  const asked = places(`motions/${encodeURIComponent(id)}?looks=true`);
   cache.set(id, asked);
   asked.catch(() => cache.delete(id));
   if (cache.size > CACHED) cache.delete(cache.keys().next().value!);
   return asked;
 }
 
-/** The places of everybody's joints, as bytes: a text of them would have to be taken apart number by number. */
+/** Where everybody's joints are and where they look, as bytes: a text would have to be taken apart number by number. */
 async function places(path: string): Promise<MotionClip> {
   const answer = await request(path, { headers: { Accept: "application/octet-stream" } });
   const all = new Float32Array(await answer.arrayBuffer());
   const [fps, count] = ["Motion-Fps", "Motion-People"].map((name) => Number(answer.headers.get(name)));
-  const size = all.length / count!;
-  return motionClip(
-    fps!,
-    Array.from({ length: count! }, (_, person) => all.subarray(person * size, (person + 1) * size)),
-  );
+  const frames = all.length / count! / (POSE + 3);
+  const parts = (from: number, size: number) =>
+    Array.from({ length: count! }, (_, person) => all.subarray(from + person * size, from + (person + 1) * size));
+  return motionClip(fps!, parts(0, frames * POSE), parts(count! * frames * POSE, frames * 3));
 }
 
 /** The address of a motion as a file. */

@@ -1,7 +1,7 @@
 /** Who is on the stage: the people of the motion, or the body that is being denoised, and ghosts. */
 
 import * as THREE from "three";
-import { type MotionClip, POSE, poseAt } from "../body/clip";
+import { type MotionClip, POSE, lookAt, poseAt } from "../body/clip";
 import { Mannequin } from "./mannequin";
 import { type FigureLook, type StageTheme } from "./theme";
 
@@ -19,6 +19,7 @@ export class Cast {
   private readonly ghosts: Mannequin[] = [];
   private readonly asked: Mannequin;
   private readonly pose = new Float32Array(POSE);
+  private readonly looked = new Float32Array(3);
 
   constructor(
     private readonly scene: THREE.Scene,
@@ -39,7 +40,7 @@ export class Cast {
   show(clip: MotionClip | null, time: number, hidden = false): void {
     this.people.forEach((one, index) => {
       one.group.visible = !hidden && clip !== null && index < clip.people.length;
-      if (clip && index < clip.people.length) one.pose(poseAt(clip, index, time, this.pose));
+      if (clip && index < clip.people.length) this.place(one, clip, index, time);
     });
   }
 
@@ -51,7 +52,7 @@ export class Cast {
       one.group.visible = body !== undefined;
       if (!body) return;
       one.look(ghostLook(body.ghost.color, GHOST_OPACITY));
-      one.pose(poseAt(body.ghost.clip, body.person, time + (body.ghost.apart ?? 0), this.pose));
+      this.place(one, body.ghost.clip, body.person, time + (body.ghost.apart ?? 0));
     });
   }
 
@@ -61,6 +62,10 @@ export class Cast {
     if (!pose) return;
     this.asked.look(ghostLook(met ? this.theme.met : this.theme.unmet, 0.42));
     this.asked.pose(pose);
+  }
+
+  private place(one: Mannequin, clip: MotionClip, person: number, time: number): void {
+    one.pose(poseAt(clip, person, time, this.pose), lookAt(clip, person, time, this.looked));
   }
 
   private add(look: FigureLook): Mannequin {

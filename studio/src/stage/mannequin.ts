@@ -1,7 +1,7 @@
 /** A figure of turned wood: skins over the 22 joints, set from their places alone. */
 
 import * as THREE from "three";
-import { HEAD, LEFT, NECK, PELVIS, RIGHT, SIDES, SPINE1, SPINE2, SPINE3, type Side } from "../body/skeleton";
+import { COUNT, HEAD, LEFT, NECK, PELVIS, RIGHT, SIDES, SPINE1, SPINE2, SPINE3, type Side } from "../body/skeleton";
 import { Loft, type Ring, solid } from "./loft";
 import type { FigureLook } from "./theme";
 
@@ -18,18 +18,25 @@ const TORSO: readonly Station[] = [
   [SPINE1, SPINE2, 0, 0.128, 0.095, 0.018],
   [SPINE1, SPINE2, 0.5, 0.124, 0.092, 0.02],
   [SPINE2, SPINE3, 0, 0.131, 0.096, 0.02],
-  [SPINE3, NECK, 0, 0.145, 0.104, 0.024],
-  [SPINE3, NECK, 0.25, 0.157, 0.11, 0.028],
-  [SPINE3, NECK, 0.48, 0.162, 0.106, 0.024],
-  [SPINE3, NECK, 0.64, 0.15, 0.09, 0.014],
-  [SPINE3, NECK, 0.78, 0.118, 0.072, 0.006],
-  [SPINE3, NECK, 0.91, 0.076, 0.058, 0.004],
-  [NECK, HEAD, 0.06, 0.053, 0.052],
+  [SPINE3, NECK, 0, 0.151, 0.106, 0.018],
+  [SPINE3, NECK, 0.25, 0.168, 0.116, 0.017],
+  [SPINE3, NECK, 0.46, 0.175, 0.115, 0.012],
+  [SPINE3, NECK, 0.62, 0.167, 0.102, 0.006],
+  [SPINE3, NECK, 0.75, 0.148, 0.084, 0.001],
+  [SPINE3, NECK, 0.86, 0.113, 0.069, 0],
+  [SPINE3, NECK, 0.95, 0.074, 0.058, 0.002],
+  [NECK, HEAD, 0.1, 0.054, 0.052],
   [NECK, HEAD, 0.6, 0.047, 0.05],
   [NECK, HEAD, 1.2, 0.045, 0.048],
 ];
+/** The joints of a side, and what is in the shoulder between the ways of the collarbone and of the arm. */
+type Limbs = Side & { readonly inside: number };
+const LIMBS: readonly Limbs[] = SIDES.map((side, n) => ({ ...side, inside: COUNT + n }));
+/** Metres that it is away from the joint of the shoulder. */
+const INSIDE = 0.1;
+const BEND = new THREE.Quaternion();
 /** Half widths of legs and arms, which are round. */
-const LEG: readonly (readonly [keyof Side, keyof Side, number, number, number?])[] = [
+const LEG: readonly (readonly [keyof Limbs, keyof Limbs, number, number, number?])[] = [
   ["hip", "knee", -0.2, 0],
   ["hip", "knee", -0.19, 0.035],
   ["hip", "knee", -0.15, 0.066],
@@ -54,15 +61,19 @@ const LEG: readonly (readonly [keyof Side, keyof Side, number, number, number?])
   ["knee", "ankle", 1.09, 0],
 ];
 const ARM: typeof LEG = [
-  ["shoulder", "elbow", -0.21, 0],
-  ["shoulder", "elbow", -0.2, 0.022],
-  ["shoulder", "elbow", -0.16, 0.041],
-  ["shoulder", "elbow", -0.08, 0.053],
-  ["shoulder", "elbow", 0.04, 0.056],
-  ["shoulder", "elbow", 0.2, 0.051],
-  ["shoulder", "elbow", 0.4, 0.045],
-  ["shoulder", "elbow", 0.6, 0.041],
-  ["shoulder", "elbow", 0.78, 0.037],
+  ["inside", "shoulder", 0, 0],
+  ["inside", "shoulder", 0.03, 0.02],
+  ["inside", "shoulder", 0.16, 0.037],
+  ["inside", "shoulder", 0.4, 0.0465],
+  ["inside", "shoulder", 0.65, 0.051],
+  ["inside", "shoulder", 0.9, 0.055],
+  ["shoulder", "elbow", 0.07, 0.0585],
+  ["shoulder", "elbow", 0.17, 0.0595],
+  ["shoulder", "elbow", 0.28, 0.057],
+  ["shoulder", "elbow", 0.4, 0.05],
+  ["shoulder", "elbow", 0.52, 0.0445],
+  ["shoulder", "elbow", 0.65, 0.041],
+  ["shoulder", "elbow", 0.78, 0.038],
   ["shoulder", "elbow", 0.9, 0.036],
   ["elbow", "wrist", 0, 0.036],
   ["elbow", "wrist", 0.1, 0.037],
@@ -75,17 +86,17 @@ const ARM: typeof LEG = [
 
 /** From the right shoulder over the chest to the left one. */
 const YOKE: readonly Station[] = [
-  [RIGHT.shoulder, RIGHT.collar, -0.3, 0, 0],
-  [RIGHT.shoulder, RIGHT.collar, -0.26, 0.025],
-  [RIGHT.shoulder, RIGHT.collar, -0.1, 0.048],
-  [RIGHT.shoulder, RIGHT.collar, 0.2, 0.057],
-  [RIGHT.shoulder, RIGHT.collar, 0.65, 0.06],
-  [RIGHT.collar, LEFT.collar, 0.5, 0.06],
-  [LEFT.shoulder, LEFT.collar, 0.65, 0.06],
-  [LEFT.shoulder, LEFT.collar, 0.2, 0.057],
-  [LEFT.shoulder, LEFT.collar, -0.1, 0.048],
-  [LEFT.shoulder, LEFT.collar, -0.26, 0.025],
-  [LEFT.shoulder, LEFT.collar, -0.3, 0, 0],
+  [RIGHT.shoulder, RIGHT.collar, -0.02, 0, 0],
+  [RIGHT.shoulder, RIGHT.collar, 0.01, 0.028],
+  [RIGHT.shoulder, RIGHT.collar, 0.14, 0.045],
+  [RIGHT.shoulder, RIGHT.collar, 0.4, 0.053, 0.052],
+  [RIGHT.shoulder, RIGHT.collar, 0.72, 0.06, 0.064],
+  [RIGHT.collar, LEFT.collar, 0.5, 0.06, 0.07],
+  [LEFT.shoulder, LEFT.collar, 0.72, 0.06, 0.064],
+  [LEFT.shoulder, LEFT.collar, 0.4, 0.053, 0.052],
+  [LEFT.shoulder, LEFT.collar, 0.14, 0.045],
+  [LEFT.shoulder, LEFT.collar, 0.01, 0.028],
+  [LEFT.shoulder, LEFT.collar, -0.02, 0, 0],
 ];
 
 /** Hand and thumb from the wrist along +Y, with the thumb on the side of +X and the palm to +Z. */
@@ -129,7 +140,7 @@ const FACE = shaped(
 
 export class Mannequin {
   readonly group = new THREE.Group();
-  private readonly joints = Array.from({ length: 22 }, () => new THREE.Vector3());
+  private readonly joints = Array.from({ length: COUNT + 2 }, () => new THREE.Vector3());
   private readonly wood: THREE.MeshStandardMaterial;
   private readonly dark: THREE.MeshStandardMaterial;
   private readonly torso = new Loft(TORSO.length, 28);
@@ -163,10 +174,10 @@ export class Mannequin {
     this.group.traverse((one) => (one.castShadow = one.receiveShadow = look.opacity === 1));
   }
 
-  /** Put every joint at its place of (22 * 3) numbers. */
-  pose(positions: ArrayLike<number>): void {
+  /** Put every joint at its place of (22 * 3) numbers; `look`: the direction of the face, else that of chest and neck. */
+  pose(positions: ArrayLike<number>, look: ArrayLike<number> | null = null): void {
     const { joints: j } = this;
-    j.forEach((joint, n) => joint.set(positions[n * 3]!, positions[n * 3 + 1]!, positions[n * 3 + 2]!));
+    for (let n = 0; n < COUNT; n += 1) j[n]!.set(positions[n * 3]!, positions[n * 3 + 1]!, positions[n * 3 + 2]!);
     const hips = from(j[RIGHT.hip]!, j[LEFT.hip]!).normalize();
     const chest = from(j[RIGHT.collar]!, j[LEFT.collar]!).normalize();
     chest.add(from(j[RIGHT.shoulder]!, j[LEFT.shoulder]!).normalize()).normalize();
@@ -178,15 +189,21 @@ export class Mannequin {
     this.torso.over(over(TORSO, (ring) => hips.clone().lerp(chest, Math.min(ring / 9, 1))));
     this.yoke.over(over(YOKE, () => spine));
     const up = from(j[NECK]!, j[HEAD]!).applyAxisAngle(chest, -NOD).normalize();
-    turn(this.head, j[HEAD]!, chest, up);
+    if (look) {
+      const ahead = new THREE.Vector3(look[0], look[1], look[2]);
+      const left = up.clone().cross(ahead);
+      turn(this.head, j[HEAD]!, left.lengthSq() > 1e-4 ? left : chest, ahead.cross(left));
+    } else turn(this.head, j[HEAD]!, chest, up);
     this.head.translateY(0.075).translateZ(0.006);
-    SIDES.forEach((side, n) => {
+    LIMBS.forEach((side, n) => {
       const { arm, leg } = this.limbs[n]!;
       const [thigh, shin] = [from(j[side.hip]!, j[side.knee]!), from(j[side.knee]!, j[side.ankle]!)];
       const [upper, fore] = [from(j[side.shoulder]!, j[side.elbow]!), from(j[side.elbow]!, j[side.wrist]!)];
       // What bends says where its front is; what is straight takes it from hips and shoulders.
       const knee = shin.clone().cross(thigh).multiplyScalar(12).addScaledVector(hips, -0.5);
       const elbow = upper.clone().cross(fore).multiplyScalar(12).addScaledVector(chest, -0.25);
+      const inwards = from(j[side.shoulder]!, j[side.collar]!).setLength(3).sub(upper.clone().normalize());
+      j[side.inside]!.copy(j[side.shoulder]!).addScaledVector(inwards.normalize(), INSIDE);
       leg.over(this.limb(LEG, side, knee));
       arm.over(this.limb(ARM, side, elbow));
       turn(this.hands[n]!, j[side.wrist]!, elbow.clone().cross(fore), fore);
@@ -207,13 +224,20 @@ export class Mannequin {
   }
 
   /** The rings of a limb, with its bends made round. */
-  private limb(stations: typeof LEG, joints: Side, side: THREE.Vector3): Ring[] {
+  private limb(stations: typeof LEG, joints: Limbs, side: THREE.Vector3): Ring[] {
     const places = stations.map(([a, b, part]) => this.joints[joints[a]]!.clone().lerp(this.joints[joints[b]]!, part));
-    return stations.map(([, , , wide, ahead], n) => {
+    const rings = stations.map(([, , , wide, ahead], n) => {
       const [before, at, behind] = [places[n - 1], places[n]!, places[n + 1]];
       const round = before && behind ? at.clone().multiplyScalar(2).add(before).add(behind).multiplyScalar(0.25) : at;
       return { at: round, side, wide, deep: wide, ahead };
     });
+    // Inside of the shoulder the rings turn with the way, without a twist.
+    for (let n = stations.findIndex(([one]) => one === "shoulder"); n > 0; n -= 1) {
+      const [way, next] = [from(rings[n - 1]!.at, rings[n]!.at), from(rings[n]!.at, rings[n + 1]!.at)];
+      BEND.setFromUnitVectors(next.normalize(), way.normalize());
+      rings[n - 1]!.side = rings[n]!.side.clone().applyQuaternion(BEND);
+    }
+    return rings;
   }
 }
 

@@ -1,4 +1,4 @@
-/** Over the heads of two people: who is asked to do what at the playhead. */
+/** Over the heads of two people: who is asked to do what at the playhead, on the page and in films. */
 
 import * as THREE from "three";
 import { type App, denoised, shownClip } from "../app/app";
@@ -14,6 +14,13 @@ const ABOVE = 0.32;
 /** Pixels of the picture within which two tags would hide each other. */
 const [WIDE, HIGH] = [200, 26];
 
+/** Words, and the pixel at the middle of their lower edge. */
+interface Tag {
+  readonly said: string;
+  readonly x: number;
+  readonly y: number;
+}
+
 export class Said {
   private readonly tags = [0, 1].map((who) =>
     h("span", { class: `tag who${who}`, "aria-hidden": "true", hidden: true }),
@@ -24,32 +31,73 @@ export class Said {
     private readonly scene: Scene,
   ) {
     scene.canvas.parentElement!.append(...this.tags);
+    scene.over = (pen, width, height) =>
+      this.over(width, height).forEach((one, who) => one && draw(pen, one, getComputedStyle(this.tags[who]!)));
   }
 
   /** Put the words where the heads are in the picture. */
   tell(): void {
+    const { clientWidth, clientHeight } = this.scene.canvas;
+    this.over(clientWidth, clientHeight).forEach((one, who) => {
+      const tag = this.tags[who]!;
+      tag.hidden = one === null;
+      if (!one) return;
+      if (tag.textContent !== one.said) tag.textContent = one.said;
+      tag.style.transform = `translate(-50%, -100%) translate(${Math.round(one.x)}px, ${Math.round(one.y)}px)`;
+    });
+  }
+
+  /** What is over each head in a picture of so many pixels; null: nothing. */
+  private over(width: number, height: number): (Tag | null)[] {
     const { time, sideBySide, fan } = this.app.session.value;
     const { people, segments } = this.app.project.value;
     const clip = denoised(this.app) ?? shownClip(this.app);
     const begun = begins(segments).filter((begin) => begin <= time + 1e-6).length;
     const one = segments[Math.min(begun, segments.length) - 1];
-    const isTold = people.length > 1 && clip?.people.length === 2 && !sideBySide && !fan && !this.app.live.value;
-    const box = this.scene.canvas.getBoundingClientRect();
-    const heads = this.tags.map((_, who) => {
-      const place = isTold && new THREE.Vector3(...jointAt(clip, who, HEAD, time));
-      return place ? this.scene.onScreen(place.setY(place.y + ABOVE)) : ([0, 0, 2] as const);
+    if (!one || people.length < 2 || clip?.people.length !== 2 || sideBySide || fan || this.app.live.value)
+      return [null, null];
+    const [first, second] = [0, 1].map((who) => {
+      const [x, y, z] = jointAt(clip, who, HEAD, time);
+      const at = new THREE.Vector3(x, y + ABOVE, z).project(this.scene.camera);
+      return { x: ((at.x + 1) / 2) * width, y: ((1 - at.y) / 2) * height, isSeen: at.z <= 1 };
     });
-    const [first, second] = heads.map(([x, y]) => ({ x, y }));
+    // Where the heads are near each other, one tag is above the other.
     const isClose = Math.abs(first!.x - second!.x) < WIDE && Math.abs(first!.y - second!.y) < HIGH;
-    this.tags.forEach((tag, who) => {
-      const [x, y, depth] = heads[who]!;
-      tag.hidden = !one || depth > 1;
-      if (!one || tag.hidden) return;
+    if (isClose) first!.y = second!.y - HIGH;
+    return [first!, second!].map(({ x, y, isSeen }, who) => {
       const said = (who === 1 && one.other.trim()) || one.text.trim() || STANDS;
-      if (tag.textContent !== said) tag.textContent = said;
-      // Where the heads are near each other, one tag is above the other.
-      const top = isClose && who === 0 ? second!.y - HIGH : y;
-      tag.style.transform = `translate(-50%, -100%) translate(${Math.round(x - box.left)}px, ${Math.round(top - box.top)}px)`;
+      return isSeen ? { said, x, y } : null;
     });
   }
+}
+
+/** Draw a tag as the page shows it. */
+function draw(pen: CanvasRenderingContext2D, { said, x, y }: Tag, look: CSSStyleDeclaration): void {
+  const { fontSize, lineHeight, paddingTop, paddingLeft, borderLeftWidth, borderTopLeftRadius, maxWidth } = look;
+  const [letters, up, inset, edge, round, most] = [
+    lineHeight,
+    paddingTop,
+    paddingLeft,
+    borderLeftWidth,
+    borderTopLeftRadius,
+    maxWidth,
+  ].map(parseFloat);
+  pen.save();
+  pen.font = `${fontSize} ${look.fontFamily}`;
+  let text = said;
+  const room = most! - edge! - 2 * inset!;
+  for (let n = said.length; pen.measureText(text).width > room && n > 0; n -= 1) text = `${said.slice(0, n)}…`;
+  const [wide, high] = [pen.measureText(text).width + edge! + 2 * inset!, letters! + 2 * up!];
+  pen.translate(Math.round(x - wide / 2), Math.round(y - high));
+  pen.beginPath();
+  pen.roundRect(0, 0, wide, high, round);
+  pen.fillStyle = look.backgroundColor;
+  pen.fill();
+  pen.clip();
+  pen.fillStyle = look.borderLeftColor;
+  pen.fillRect(0, 0, edge!, high);
+  pen.fillStyle = look.color;
+  pen.textBaseline = "middle";
+  pen.fillText(text, edge! + inset!, high / 2);
+  pen.restore();
 }

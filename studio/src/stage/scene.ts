@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { type Backdrop, NONE, cover, textureOf } from "./backdrop";
 import { Floor } from "./floor";
+import { Pending } from "./pending";
 import type { StageTheme } from "./theme";
 
 /** The layer of what is there to be dragged, which no film shows. */
@@ -38,6 +39,7 @@ export class Scene {
   /** When the last picture was drawn, and whether it has fewer pixels than it could have. */
   private drawn = 0;
   private isCoarse = false;
+  private readonly pending: Pending;
   private next = 0;
   private lifted = 0;
   private theme: StageTheme;
@@ -48,6 +50,7 @@ export class Scene {
   private besides = 0;
   /** While pictures of a film are drawn: their size. */
   private filmed: readonly [number, number] | null = null;
+  private readonly flat = document.createElement("canvas");
   private readonly sizes = new ResizeObserver(() => this.resize());
 
   /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp a second later. */
@@ -56,6 +59,8 @@ export class Scene {
   step: (elapsed: number) => boolean = () => false;
   /** Called behind each picture. */
   painted: () => void = () => undefined;
+  /** Called for each picture of a film: draws over it, which is so wide and high. */
+  over: (pen: CanvasRenderingContext2D, width: number, height: number) => void = () => undefined;
   /** Called instead of a plain draw, where the picture is divided. */
   paint: (() => void) | null = null;
 
@@ -85,6 +90,7 @@ export class Scene {
     this.orbit.addEventListener("change", () => this.invalidate());
     this.look(theme);
     this.software = isSoftware(this.renderer.getContext());
+    this.pending = new Pending(this.renderer.getContext() as WebGL2RenderingContext);
     if (this.software) this.coarsen(COARSEST);
     this.sizes.observe(canvas.parentElement!);
     this.resize();
@@ -204,12 +210,19 @@ export class Scene {
     this.resize();
   }
 
-  /** The picture as it is now. */
+  /** The picture as it is now, with what is over it: beside the people as large as on the page, and never smaller. */
   shot(): Promise<Blob> {
     this.camera.lookAt(this.orbit.target);
     this.draw();
+    const { width, height, clientHeight } = this.canvas;
+    Object.assign(this.flat, { width, height });
+    const pen = this.flat.getContext("2d")!;
+    pen.drawImage(this.canvas, 0, 0);
+    const scale = Math.max(height / clientHeight, 1);
+    pen.scale(scale, scale);
+    this.over(pen, width / scale, height / scale);
     return new Promise((done, fail) =>
-      this.canvas.toBlob(
+      this.flat.toBlob(
         (blob) =>
           blob ? done(blob) : fail(new Error("this browser could not draw a picture of that size; choose another.")),
         "image/jpeg",
@@ -234,12 +247,15 @@ export class Scene {
     if (!changed) this.slow = 0;
     const sharpens = this.isCoarse && now - this.drawn > (this.busy() ? 4 * REST : REST);
     if (!changed && !sharpens) return;
+    this.dirty = changed;
+    if (this.pending.isDrawing) return;
     this.dirty = false;
     // One change alone is drawn as it should be; several at once, and what changes while somebody draws, coarsely first.
     this.isCoarse = changed && this.coarse < this.fine && (now - this.drawn < REST || this.busy());
     this.sharpness(this.isCoarse ? this.coarse : this.fine);
     if (changed) this.drawn = now;
     this.draw();
+    if (this.software) this.pending.begin();
     this.painted();
     if (changed) this.adapt(elapsed);
   }

@@ -1,14 +1,12 @@
 /** Steps under somebody who goes up or down (`motionloom.kinematics.stairs`), as solid blocks on the floor. */
 
 import * as THREE from "three";
-import type { MotionClip } from "../body/clip";
+import { type MotionClip, POSE } from "../body/clip";
 import { COUNT, PELVIS, SIDES } from "../body/skeleton";
-import { stairs } from "../prior/stairs";
+import { isUp, stairs } from "../prior/stairs";
 import type { Vec } from "../prior/turns";
 import type { StageTheme } from "./theme";
 
-/** Metres: nobody climbs whose lowest joint is never so high. */
-const UP = 0.12;
 /** Metres from side to side, and of one step from front to back at least and at most. */
 const WIDE = 0.95;
 const [SHORT, LONG] = [0.24, 0.5];
@@ -23,16 +21,24 @@ export interface Step {
   readonly yaw: number;
 }
 
+/** The height of the lowest joint in each frame. */
+function lowest(data: Float32Array): number[] {
+  const low = new Array<number>(data.length / POSE).fill(Infinity);
+  for (let n = 1; n < data.length; n += 3) low[Math.floor(n / POSE)] = Math.min(low[Math.floor(n / POSE)]!, data[n]!);
+  return low;
+}
+
 /** The steps that the people of a motion tread on; none where they stay on the floor. */
 export function stepsOf(clip: MotionClip): Step[] {
   return clip.people.flatMap((data) => {
+    // Most motions stay on the floor, and long ones are long lists of places.
+    if (!isUp(lowest(data), clip.fps)) return [];
     const places = Array.from({ length: clip.frames }, (_, frame) =>
       Array.from({ length: COUNT }, (_, joint): Vec => {
         const at = (frame * COUNT + joint) * 3;
         return [data[at]!, data[at + 1]!, data[at + 2]!];
       }),
     );
-    if (!places.some((pose) => pose.every(([, y]) => y > UP))) return [];
     const found = stairs(places, clip.fps);
     if (!found) return [];
     // Of each level, where the feet and the hips are on it.

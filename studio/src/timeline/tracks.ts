@@ -49,7 +49,7 @@ export function trackRows(app: App, who: number, span: (from: number, until: num
     const hint = h(
       "span",
       { class: "hint" },
-      "Shift A: an arm or the legs do something else; Shift L: the head looks somewhere; Shift N: smoother",
+      "Shift A: an arm, the legs or the head do something else; Shift L: the head looks somewhere; Shift N: smoother",
     );
     return h(
       "div",

@@ -275,3 +275,18 @@ def test_an_unknown_format_or_skeleton_is_refused(server: Server, walk: str) -> 
         status, answer = server.json("GET", path)
         assert status == 404
         assert said in answer["error"]
+
+
+def test_bytes_say_where_everybody_looks(server: Server, walk: str) -> None:
+    _, seen = server.json("GET", f"/motions/{walk}")
+    frames, ahead = seen["frames"], decoded(seen["people"][0]["looks"], seen["frames"], 3)
+    status, _, data = server.ask("GET", f"/motions/{walk}?looks=true", headers={"Accept": "application/octet-stream"})
+    assert status == 200
+    found = np.frombuffer(data, "<f4")
+    assert np.array_equal(found[: frames * 66].reshape(frames, 22, 3), places(server, walk))
+    assert np.array_equal(found[frames * 66 :].reshape(frames, 3), ahead)
+    assert np.allclose(np.linalg.norm(ahead, axis=-1), 1.0, atol=1e-6)
+    way = places(server, walk)[-1, 0] - places(server, walk)[0, 0]
+    assert (ahead @ (way / np.linalg.norm(way))).min() > 0.6, "who walks looks ahead"
+    _, _, plain = server.ask("GET", f"/motions/{walk}", headers={"Accept": "application/octet-stream"})
+    assert plain == data[: frames * 66 * 4]

@@ -357,3 +357,19 @@ def test_an_unknown_job_is_404(server: Server) -> None:
         status, answer = server.json(method, path)
         assert status == 404
         assert "no such job" in answer["error"]
+
+
+def test_words_of_a_head_are_done_without_a_remark(server: Server, walk: str) -> None:
+    asked = {"task": "edit", "motion": walk, "keep": ["lower_body", "torso", "left_arm", "right_arm"]}
+    made = server.draw(**asked, prompt="nods twice")
+    assert made["remarks"] == []
+    first, second = (
+        decoded(server.json("GET", f"/motions/{one}")[1]["people"][0]["looks"], 40, 3)
+        for one in (walk, made["results"][0]["id"])
+    )
+    assert 0.2 < (first - second)[:, 1].max() < 0.5
+    refused = server.wait(server.submit(**asked, prompt="kicks"))
+    assert (refused["state"], refused["error"].split(";")[0]) == (
+        "failed",
+        "a head nods, shakes, looks left, right, up or down, and looks around",
+    )

@@ -54,8 +54,8 @@ def walk(studio: Studio, folder: Path) -> None:
     studio.drawn()
     for _ in range(3):
         studio.key("PageUp")
-    keep(studio, folder / "studio_target.png")
     studio.drawn()
+    keep(studio, folder / "studio_target.png")
 
     studio.key("v", "Escape", "g")
     studio.drawn()

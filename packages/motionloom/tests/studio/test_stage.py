@@ -72,7 +72,7 @@ def test_a_film_that_is_cancelled_leaves_nothing(studio: Studio):
     studio.key("Shift+V")
     studio.page.get_by_label("Size", exact=True).select_option("1280x720")
     studio.page.get_by_role("button", name="Write the film").click()
-    studio.says(studio.page.locator("#film [role=status]"), "Picture 3 of")
+    studio.says(studio.page.locator("#film [role=status]"), "Picture ")
     studio.key("Escape")
     studio.page.wait_for_selector("#film", state="hidden")
     studio.page.wait_for_timeout(1000)
@@ -139,3 +139,18 @@ def test_a_picture_is_behind_the_people_until_the_theme_is(studio: Studio, tmp_p
     studio.page.get_by_text("As the theme").click()
     studio.key("Escape")
     assert np.array_equal(studio.picture()[10, 200], before)
+
+
+def test_words_over_heads_are_in_a_film(studio: Studio):
+    studio.open(("two people greet each other", 2.0), people=2, seed=4)
+    studio.key("Home")
+    _still(studio)
+    canvas = studio.page.locator("#canvas").bounding_box()
+    tags = [one.bounding_box() for one in studio.page.locator("#stage .tag").all()]
+    page = np.asarray(Image.open(io.BytesIO(studio.page.screenshot())).convert("RGB")).astype(int)
+    picture = _film(studio, Size="page")[0]
+    for tag in tags:
+        x, y = round(tag["x"]) + 1, round(tag["y"] + tag["height"] / 2)
+        edge = picture[y - round(canvas["y"]) - 5 :, x - round(canvas["x"])][:10]
+        assert np.abs(np.median(edge, axis=0) - np.median(page[y - 5 : y + 5, x], axis=0)).max() < 40, edge
+    assert len({tuple(page[round(tag["y"]) + 10, round(tag["x"]) + 1]) for tag in tags}) == 2, "each has its colour"

@@ -120,3 +120,18 @@ def test_an_arm_follows_a_clip_that_was_put_aside(studio: Studio):
     assert np.abs(made[0, :, LEGS] - walk[0, :, LEGS]).max() < 1e-4
     raised = wrist_over_shoulder(made) - wrist_over_shoulder(waves)
     assert np.abs(raised).mean() < 0.2, "the arm does what it did in the clip, on another back"
+
+
+def test_a_head_nods_by_words(studio: Studio):
+    studio.open(("a person stands still", 3.0))
+    still = studio.motion()[0]
+    studio.key("ArrowDown", "Shift+A")
+    studio.page.keyboard.type("nods")
+    studio.key("Enter")
+    studio.page.locator("#inspector select[aria-label='Which part']").select_option("head")
+    project = studio.project()
+    assert [job["prompt"] for job in json.loads(project["drawn"]) if "prompt" in job] == ["nods"]
+    made = studio.motion(project)[0]
+    assert np.abs(made[:, LEGS] - still[:, LEGS]).max() < 1e-4
+    assert 0.005 < (still - made)[:, HEAD, 1].max() < 0.1, "the neck nods, too"
+    studio.says(studio.page.locator(".own:not(.old)"), "nods")

@@ -7,7 +7,7 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
-from motionloom.kinematics.gaze import NOD, TURN, looking
+from motionloom.kinematics.gaze import NOD, TURN, looking, looks
 from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
 from motionloom.retarget import from_smpl22, joints22
@@ -90,6 +90,49 @@ def test_a_head_turns_no_further_than_a_neck_can_and_not_to_what_is_behind() -> 
         assert angle == pytest.approx(TURN if degrees == 90 else 0.0, abs=1e-6)
     high = looking(clip, clip.positions()[0, HEAD] + [0, 50, 0] + ahead, np.ones(len(clip)))
     assert np.arccos(gaze(high)[0] @ ahead) == pytest.approx(NOD, abs=1e-6)
+
+
+ALL_BUT_THE_HEAD = ("lower_body", "torso", "left_arm", "right_arm")
+
+
+def moved(words: str, clip: Motion, *spans: tuple[float, float]) -> np.ndarray:
+    """(frames, 2) degrees to the left and up of where the head looked, of a clip that faces +Z or nearly."""
+    made = changed(clip, *changes_asked(words, keep=ALL_BUT_THE_HEAD, between=spans))
+    others = [joint for joint in range(22) if joint not in SMPL22.groups["head_neck"]]
+    assert np.array_equal(made.rotations[:, others], clip.rotations[:, others])
+    assert np.allclose(looks(made), gaze(made), atol=0.06), "the uniform person's face is to the front of its head"
+    ahead = rot.rotate(rot.inverse(clip.world_rotations()[:, SPINE]), looks(made))
+    before = rot.rotate(rot.inverse(clip.world_rotations()[:, SPINE]), looks(clip))
+    angles = [np.stack([np.arctan2(one[:, 0], one[:, 2]), np.arcsin(one[:, 1])], axis=-1) for one in (ahead, before)]
+    return np.degrees(angles[0] - angles[1])
+
+
+def test_a_head_does_what_words_say_of_it() -> None:
+    clip = waving(4.0)
+    for words, left, up in (("looks to the left", 55, 0), ("he looks up and to his right", -55, 30)):
+        found = moved(words, clip, (1.0, 3.0))
+        assert found[60] == pytest.approx([left, up], abs=3), words
+        assert np.abs(found[:30]).max() == np.abs(found[90:]).max() == 0
+        assert np.abs(np.diff(found, axis=0)).max() < 10, "softly"
+    nods = moved("nods twice", clip)
+    assert nods[:, 1].min() == pytest.approx(-20, abs=2)
+    assert np.abs(nods[:, 0]).max() < 1
+    down = nods[:, 1] < -10
+    assert (np.diff(down.astype(int)) == 1).sum() == 2
+    assert np.abs(nods[60:]).max() < 1e-6, "twice, and then no more"
+    slightly = moved("nods slightly and slowly", clip)[:, 1]
+    assert slightly.min() == pytest.approx(-10, abs=1)
+    for words, side in (("shakes the head three times", 20), ("looks around", 50)):
+        found = moved(words, clip)
+        assert found[:, 0].max() > side
+        assert found[:, 0].min() < -side
+        assert np.abs(found[:, 1]).max() < 3
+
+
+def test_words_that_say_nothing_of_a_head_are_refused() -> None:
+    with pytest.raises(MotionloomError, match=r"a head nods, shakes, looks left.*'kicks' says none of these"):
+        changes_asked("kicks", keep=ALL_BUT_THE_HEAD)
+    assert [type(one).__name__ for one in changes_asked("kicks", keep=ALL_BUT_THE_ARM)] == ["Redraw"]
 
 
 def test_a_look_begins_and_ends_softly() -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 import subprocess
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -16,6 +17,7 @@ from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.viz import draw
 from motionloom.viz.draw import Camera, capsules, hull
 from motionloom.viz.figure import body_height, figure, joint_sides
+from motionloom.viz.film import write_film
 from motionloom.viz.video import draw_sheet, draw_video
 from tests.work import work
 
@@ -202,6 +204,26 @@ def test_fast_recordings_are_filmed_at_a_whole_fraction_of_their_rate(tmp_path: 
 def test_people_side_by_side_hold_their_last_pose(tmp_path: Path) -> None:
     path = draw_video([standing(40), standing(10)], tmp_path / "x.mp4", size=(192, 96))
     assert probe(path)[0] == 40
+
+
+def test_a_gif_has_the_colours_of_all_its_pictures(tmp_path: Path) -> None:
+    ramp = np.linspace(40, 250, 64).astype(np.uint8)
+    asked: list[list[int]] = []
+
+    def frames(numbers: Sequence[int]) -> Iterator[Image.Image]:
+        asked.append(list(numbers))
+        for number in numbers:  # grey at first, then a ramp of another colour in each quarter
+            picture = np.zeros((64, 64, 3), np.uint8)
+            picture[..., [[0, 1, 2], [0], [1], [2]][number // 10]] = np.roll(ramp, number)[:, None]
+            picture[number, :2] = (200, 90, 20)
+            yield Image.fromarray(picture)
+
+    film = Image.open(write_film(frames, tmp_path / "x.gif", (64, 64), rate=20, count=40))
+    for number, wanted in enumerate(frames(range(40))):
+        film.seek(number)
+        assert np.abs(np.asarray(film.convert("RGB")).astype(int) - np.asarray(wanted)).max() < 14, number
+    assert len(asked[0]) < 10
+    assert asked[1] == list(range(40))
 
 
 def test_a_gif_lasts_as_long_as_the_motion(tmp_path: Path) -> None:

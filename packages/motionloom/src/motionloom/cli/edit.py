@@ -23,6 +23,7 @@ from motionloom.io.bvh_writer import save_bvh
 from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
 from motionloom.retarget import to_smpl22
+from motionloom.tasks.laid import only_head
 from motionloom.tasks.run import Models, Plan
 
 
@@ -41,7 +42,8 @@ def run_edit(arguments: argparse.Namespace) -> int:
     check_size(arguments, arguments.clip, clip)
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
-    remarks = remark_unknown(prior, [arguments.text or ""])
+    keep = [name.strip() for part in arguments.keep for name in part.split(",")]
+    remarks = [] if only_head(keep) else remark_unknown(prior, [arguments.text or ""])
     unit, orders = (None, {}) if uniform else (unit, orders)
     made = Finished(
         files,
@@ -49,7 +51,6 @@ def run_edit(arguments: argparse.Namespace) -> int:
         _writer(captions, target, arguments.out_unit or unit, orders),
         put=lambda motions: put_all(target, at_rate(motions, arguments.fps)),
     )
-    keep = [name.strip() for part in arguments.keep for name in part.split(",")]
     values = request_of(arguments, Edit, {"motion": clip, "prompt": arguments.text, "keep": keep})
     source = None if arguments.source is None else read_clip(arguments, arguments.source)[0]
     clip = crop(clip, arguments)

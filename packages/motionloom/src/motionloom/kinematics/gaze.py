@@ -21,6 +21,21 @@ FORWARD = np.array([0.0, 0.0, -1.0])
 """In the anatomical frame of the head and the spine: up, to the left, back."""
 
 
+def looks(motion: Motion) -> Array:
+    """Unit vectors (frames, 3) in the world: the direction of the face.
+
+    Args:
+        motion: one person on any humanoid skeleton.
+
+    Raises:
+        MotionloomError: for a skeleton without a head.
+    """
+    body = read_body(motion.skeleton)
+    if (head := body.drivers[15]) is None:
+        raise MotionloomError("the clip's skeleton has no head; take one with a head")
+    return rot.rotate(rot.multiply(motion.world_rotations()[:, head], body.frames[15]), FORWARD)
+
+
 def looking(motion: Motion, points: Array, weights: Array) -> Motion:
     """The motion with its head turned to places; half of the turn is the neck's.
 
@@ -32,24 +47,43 @@ def looking(motion: Motion, points: Array, weights: Array) -> Motion:
     Raises:
         MotionloomError: for a skeleton without a head that turns.
     """
+    head, _, seen = _seen(motion)
+    side, rise = _angles(rot.rotate(rot.inverse(seen), points - motion.positions()[:, head]))
+    share = 1 - smoothstep((np.abs(side) - BEHIND[0]) / (BEHIND[1] - BEHIND[0]))
+    return _aimed(motion, np.clip(side, -TURN, TURN), np.clip(rise, -NOD, NOD), weights * share)
+
+
+def turned(motion: Motion, left: Array, up: Array) -> Motion:
+    """The motion with its head turned from where it looks, as far as a neck can; half of the turn is the neck's.
+
+    Args:
+        motion: one person on any humanoid skeleton.
+        left: (frames,) radians to the left, about the axis of the chest.
+        up: (frames,) radians up.
+
+    Raises:
+        MotionloomError: for a skeleton without a head that turns.
+    """
+    side, rise = _angles(rot.rotate(rot.inverse(_seen(motion)[2]), looks(motion)))
+    side, rise = (
+        np.clip(now + more, np.minimum(now, -most), np.maximum(now, most))
+        for now, more, most in ((side, left, TURN), (rise, up, NOD))
+    )
+    return _aimed(motion, side, rise, np.any([left, up], axis=0).astype(float))
+
+
+def _seen(motion: Motion) -> tuple[int, int | None, Array]:
+    """The joints of the head and of a neck that turns it, and the frame (frames, 4) of the chest below them."""
     body = read_body(motion.skeleton)
     head, neck = body.drivers[15], body.drivers[12]
     chest, frame = next((driver, body.frames[j]) for j in (9, 6, 3, 0) if (driver := body.drivers[j]) is not None)
     if head is None or head == chest:
         raise MotionloomError("the clip's skeleton has no head that turns; take one with a head, or leave out the look")
-    world = motion.world_rotations()
-    eyes, seen = motion.positions()[:, head], rot.multiply(world[:, chest], frame)
-    aim, share = _bounded(rot.rotate(rot.inverse(seen), points - eyes))
-    now = rot.rotate(rot.multiply(world[:, head], body.frames[15]), FORWARD)
-    turn = rot.quat_to_rotvec(rot.shortest_arc(now, rot.rotate(seen, aim))) * (weights * share)[:, None]
-    parts = [neck, head] if neck in motion.skeleton.ancestors(head)[1:] and neck != chest else [head]
-    made = motion
-    for joint in parts:
-        made = _turned(made, joint, rot.rotvec_to_quat(turn / len(parts)))
-    return made
+    turns = neck in motion.skeleton.ancestors(head)[1:] and neck != chest
+    return head, neck if turns else None, rot.multiply(motion.world_rotations()[:, chest], frame)
 
 
-def _turned(motion: Motion, joint: int, turn: Array) -> Motion:
+def _joint_turned(motion: Motion, joint: int, turn: Array) -> Motion:
     """The motion with a joint, and what hangs on it, turned by (frames, 4) about axes of the world."""
     world, rotations = motion.world_rotations(), motion.rotations.copy()
     above = world[:, motion.skeleton.parents[joint]]
@@ -57,11 +91,18 @@ def _turned(motion: Motion, joint: int, turn: Array) -> Motion:
     return replace(motion, rotations=rot.unroll(rotations))
 
 
-def _bounded(wanted: Array) -> tuple[Array, Array]:
-    """Directions (frames, 3) within what a neck can, seen from the chest, and how far they are followed (frames,)."""
-    up, left, back = np.moveaxis(wanted, -1, 0)
-    side, rise = np.arctan2(left, -back), np.arctan2(up, np.hypot(left, back))
-    share = 1 - smoothstep((np.abs(side) - BEHIND[0]) / (BEHIND[1] - BEHIND[0]))
-    side, rise = np.clip(side, -TURN, TURN), np.clip(rise, -NOD, NOD)
+def _angles(seen: Array) -> tuple[Array, Array]:
+    """Radians to the left and up (frames,) of directions (frames, 3) in the frame of the chest."""
+    up, left, back = np.moveaxis(seen, -1, 0)
+    return np.arctan2(left, -back), np.arctan2(up, np.hypot(left, back))
+
+
+def _aimed(motion: Motion, side: Array, rise: Array, weights: Array) -> Motion:
+    """The motion with its head turned to so many radians to the left and up of the chest's front."""
+    head, neck, seen = _seen(motion)
     aim = np.stack([np.sin(rise), np.cos(rise) * np.sin(side), -np.cos(rise) * np.cos(side)], axis=-1)
-    return aim, share
+    turn = rot.quat_to_rotvec(rot.shortest_arc(looks(motion), rot.rotate(seen, aim))) * weights[:, None]
+    parts = [head] if neck is None else [neck, head]
+    for joint in parts:
+        motion = _joint_turned(motion, joint, rot.rotvec_to_quat(turn / len(parts)))
+    return motion

@@ -1,7 +1,7 @@
 """Pictures and films of a robot, through MuJoCo's offscreen renderer where it works and our own where it does not."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,11 @@ def draw(robot: Robot, poses: Array, fps: float, path: Path, *, caption: str = "
         rate = film_rate(path, fps, None)
         count = max(1, round((len(poses) - 1) / fps * rate) + 1)
         shown = poses[np.minimum(np.arange(count) * fps / rate, len(poses) - 1).round().astype(int)]
-        return write_film(lambda: renderer.pictures(shown), path, renderer.size, rate=rate, count=count)
+
+        def frames(numbers: Sequence[int]) -> Iterator[Image.Image]:
+            return renderer.pictures(shown[list(numbers)])
+
+        return write_film(frames, path, renderer.size, rate=rate, count=count)
 
 
 def _sheet(renderer: "_Renderer", poses: Array, path: Path) -> Path:

@@ -218,7 +218,8 @@ async def motion(request: Request) -> Response:
     name, dot, kind = request.path_params["name"].partition(".")
     stored = await run_in_threadpool(studio.project.motion, name)
     if not dot and "application/octet-stream" in request.headers.get("accept", ""):
-        places = await run_in_threadpool(files.places, stored)
+        seeing = request.query_params.get("looks") == "true"
+        places = await run_in_threadpool(files.places, stored, seeing=seeing)
         headers = {"Motion-Fps": f"{stored.people[0].fps:g}", "Motion-People": str(len(stored.people))}
         return Response(places, media_type="application/octet-stream", headers=headers)
     if not dot:

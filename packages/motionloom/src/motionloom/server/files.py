@@ -13,6 +13,7 @@ from motionloom.goals.fields import Field
 from motionloom.io import load, load_scene, save, save_scene
 from motionloom.io.text import parse_json
 from motionloom.kinematics.deeds import happened
+from motionloom.kinematics.gaze import looks
 from motionloom.motion import Motion
 from motionloom.requests.export import Export
 from motionloom.retarget import RootMode, retarget, to_smpl22
@@ -50,6 +51,7 @@ def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
                 "positions": encode(uniform.positions()),
                 "rotations": encode(uniform.rotations),
                 "root": encode(uniform.root),
+                "looks": encode(looks(uniform)),
             }
         )
     first = stored.people[0]
@@ -57,9 +59,14 @@ def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
     return about | {"people": people, "about": stored.about}
 
 
-def places(stored: Stored) -> bytes:
-    """Where the 22 joints of everybody are: (people, frames, 22, 3) metres, little-endian float32."""
-    return b"".join(float32(_uniform(person).positions()) for person in stored.people)
+def places(stored: Stored, *, seeing: bool = False) -> bytes:
+    """Where the 22 joints of everybody are: (people, frames, 22, 3) metres, little-endian float32.
+
+    seeing: behind them the directions in which the heads look, (people, frames, 3) of length 1.
+    """
+    people = [_uniform(person) for person in stored.people]
+    found = [person.positions() for person in people] + [looks(person) for person in people if seeing]
+    return b"".join(map(float32, found))
 
 
 def deeds_between(stored: Stored, begin: str | None, end: str | None) -> list[dict[str, Any] | None]:
@@ -87,7 +94,7 @@ def from_json(part: Path, name: str) -> list[Motion]:
 
 
 def _person(found: Field, fps: float) -> Motion:
-    given = found.mapping(("root", "rotations", "positions"), ("root", "rotations"))
+    given = found.mapping(("root", "rotations", "positions", "looks"), ("root", "rotations"))
     root, rotations = _decoded(given["root"], 3), _decoded(given["rotations"], 4 * len(SMPL22))
     lengths = np.linalg.norm(rotations.reshape(len(rotations), -1, 4), axis=-1, keepdims=True)
     if len(root) != len(rotations):

@@ -1,17 +1,19 @@
 """Films of pictures that a page draws: one picture after the other over a WebSocket, encoded as they come.
 
 The connection is the film: a client that leaves, is too slow or sends what is no picture ends the encoder, and nothing
-is left of its file. A picture is taken when the encoder wants it, so neither side keeps more than a few.
+is left of its file. A picture is taken when the encoder wants it, so neither side keeps more than a few. Those
+of a GIF are in a file until the last one has come, because its palette is of all of it.
 """
 
 import asyncio
 import io
 import json
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryFile
+from typing import IO, TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -45,6 +47,22 @@ class Asked:
     size: tuple[int, int]
     fps: float
     count: int
+
+    def decoded(self, data: bytes) -> "Image.Image":
+        """A picture as it was sent; raises `MotionloomError` for what is no picture of this film."""
+        from PIL import Image
+
+        try:
+            picture = Image.open(io.BytesIO(data), formats=("JPEG", "PNG"))
+            if picture.size != self.size:
+                width, height = self.size
+                raise MotionloomError(
+                    f"a picture has {picture.width}x{picture.height} pixels; the film {width}x{height}"
+                )
+            return picture.convert("RGB")
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+            why = one_line(str(error))[:80]
+            raise MotionloomError(f"a picture of the film is no whole JPEG or PNG ({why})") from None
 
 
 class _Gone(Exception):
@@ -121,10 +139,10 @@ class _Pictures:
         self._loop = asyncio.get_running_loop()
         self._rest = bytearray()
 
-    def __iter__(self) -> "Iterator[Image.Image]":
+    def __iter__(self) -> Iterator[bytes]:
         for number in range(self.asked.count):
             coming = asyncio.run_coroutine_threadsafe(self._next(number), self._loop)
-            yield _decoded(coming.result(2 * self._seconds), self.asked.size)
+            yield coming.result(2 * self._seconds)
 
     async def _next(self, number: int) -> bytes:
         """The next picture; what was taken before is counted to the client."""
@@ -143,25 +161,28 @@ class _Pictures:
         return taken
 
 
-def _decoded(data: bytes, size: tuple[int, int]) -> "Image.Image":
-    from PIL import Image
-
-    try:
-        picture = Image.open(io.BytesIO(data), formats=("JPEG", "PNG"))
-        if picture.size != size:
-            raise MotionloomError(
-                f"a picture has {picture.width}x{picture.height} pixels; the film {size[0]}x{size[1]}"
-            )
-        return picture.convert("RGB")
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise MotionloomError(f"a picture of the film is no whole JPEG or PNG ({one_line(str(error))[:80]})") from None
-
-
 def _write(pictures: _Pictures, part: Path) -> None:
     from motionloom.viz.film import write_film
 
     asked = pictures.asked
-    write_film(lambda: iter(pictures), part, asked.size, rate=asked.fps, count=asked.count)
+    with TemporaryFile(dir=part.parent) as file:
+        frames = _kept(pictures, file) if asked.format == "gif" else lambda _: map(asked.decoded, pictures)
+        write_film(frames, part, asked.size, rate=asked.fps, count=asked.count)
+
+
+def _kept(pictures: _Pictures, file: IO[bytes]) -> "Callable[[Sequence[int]], Iterator[Image.Image]]":
+    """Pictures that can be seen again: a GIF's palette is of pictures from all over it."""
+    ends = [0]
+    for data in pictures:
+        pictures.asked.decoded(data)
+        ends.append(ends[-1] + file.write(data))
+
+    def seen(numbers: Sequence[int]) -> "Iterator[Image.Image]":
+        for number in numbers:
+            file.seek(ends[number])
+            yield pictures.asked.decoded(file.read(ends[number + 1] - ends[number]))
+
+    return seen
 
 
 async def _send(websocket: WebSocket, part: Path) -> None:

@@ -15,6 +15,7 @@ from motionloom.edits.boundary import InpaintWindow
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.goals.heads import read_head
 from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
 from motionloom.requests.fields import specs
@@ -22,7 +23,7 @@ from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.laid import Lay, Look, Smooth, Span, Spanned, check_parts, joints_of, kept_joints
+from motionloom.tasks.laid import Lay, Look, Nod, Smooth, Span, Spanned, check_parts, joints_of, kept_joints, only_head
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
     apply_sample,
@@ -123,7 +124,7 @@ class Loop:
         return _looped(sampler, clip, self.blend, seed)
 
 
-Change: TypeAlias = Redraw | Extend | Loop | Lay | Look | Smooth
+Change: TypeAlias = Redraw | Extend | Loop | Lay | Look | Nod | Smooth
 
 
 def edit(
@@ -144,8 +145,8 @@ def edit(
         prior: weights that make HumanML3D's 263 numbers.
         motion: the clip, on any humanoid skeleton and at any rate; what is not changed comes back bit for bit.
         text: what the person does; an empty one asks for nothing in particular.
-        changes: `Redraw`, `Extend`, `Loop`, `Lay`, `Look` and `Smooth`, one after the other; a text alone
-            redraws the whole clip.
+        changes: `Redraw`, `Extend`, `Loop`, `Lay`, `Look`, `Nod` and `Smooth`, one after the other; a text
+            alone redraws the whole clip.
         skeleton: the clip's own, or the 22-joint person. The result stands where the clip stood.
         foot_lock: keep planted feet still where legs are sampled.
         sampling: or single settings of it as keywords; version i of ``count`` is sampled from ``seed + i``.
@@ -202,6 +203,7 @@ def changes_asked(
 ) -> list[Change]:
     """What single options ask for: with neither ``between`` nor ``extend`` a text is about the whole clip.
 
+    Where everything is kept but the head, the text says what that does (`motionloom.goals.heads`).
     source: a clip whose parts take the place of a text. look: where the head looks, as of `Look`.
     smooth: seconds, as of `Smooth`. Raises MotionloomError where nothing is asked, and for a text beside a source.
     """
@@ -211,6 +213,8 @@ def changes_asked(
         if said:
             raise MotionloomError("parts do what a text says or what another clip does; leave out one of them")
         asked.append(Lay(tuple(between), source, tuple(keep)))
+    elif said and only_head(keep):
+        asked.append(Nod(tuple(between), read_head(text)))
     elif said or (between and look is None and not smooth):
         asked.append(Redraw(tuple(between), tuple(keep), strength))
     elif keep and not smooth:

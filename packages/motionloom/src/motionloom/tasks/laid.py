@@ -12,8 +12,9 @@ from motionloom import rotations as rot
 from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.goals.heads import HeadMove
 from motionloom.kinematics.feet import clean_feet, planted_feet
-from motionloom.kinematics.gaze import looking
+from motionloom.kinematics.gaze import looking, turned
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.onto import onto, place_of, with_place
@@ -97,6 +98,22 @@ class Look(Spanned):
 
 
 @dataclass(frozen=True, eq=False)
+class Nod(Spanned):
+    """A head that nods, is shaken or looks aside in each stretch, from where it is."""
+
+    move: HeadMove | None = None
+
+    def apply(self, sampler: Any, clip: Motion, seed: int) -> Motion:
+        """The clip with its head moved."""
+        assert self.move is not None
+        left, up = np.zeros((2, len(clip)))
+        for first, last in self.frames(clip):
+            time = np.arange(0.5, last - first) / clip.fps
+            left[first:last], up[first:last] = self.move.at(time, (last - first) / clip.fps)
+        return turned(clip, left, up)
+
+
+@dataclass(frozen=True, eq=False)
 class Smooth(Spanned):
     """Joints and the root without what is quicker than some seconds, in each stretch."""
 
@@ -145,6 +162,12 @@ def check_parts(keep: Sequence[str]) -> None:
 def joints_of(keep: Sequence[str]) -> frozenset[int]:
     """The joints of parts, out of 22."""
     return frozenset(SMPL22.resolve(name for name in keep if name not in ("root", "root_horizontal")))
+
+
+def only_head(keep: Sequence[str]) -> bool:
+    """Whether everything stays but head and neck, of which the text says what they do; errors as of `check_parts`."""
+    check_parts(keep)
+    return not set(range(len(SMPL22))) - joints_of(keep) - set(SMPL22.groups["head_neck"])
 
 
 def kept_joints(clip: Motion, keep: Sequence[str]) -> Kept:

@@ -1,10 +1,9 @@
 """Films from pictures: MP4 through ffmpeg, GIF through Pillow; rates, sizes and lengths that are sane; lettering."""
 
-import itertools
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,8 @@ from motionloom.io.atomic import atomic_path
 MAX_FPS = 60.0
 MAX_GIF_FPS = 25.0
 MAX_GIF_FRAMES = 1500
+SAMPLED = 9
+"""Pictures of a GIF that its palette is made of."""
 MAX_PIXELS = 4096 * 2304
 
 
@@ -37,17 +38,17 @@ def film_size(size: tuple[int, int]) -> tuple[int, int]:
 
 
 def write_film(
-    frames: Callable[[], Iterator[Image.Image]],
+    frames: Callable[[Sequence[int]], Iterator[Image.Image]],
     path: str | Path,
     size: tuple[int, int],
     *,
     rate: float,
     count: int,
-    sample: Callable[[], Image.Image] | None = None,
 ) -> Path:
-    """Write ``count`` pictures of ``size`` as .mp4 (H.264) or .gif; ``frames`` is asked once the place is sure.
+    """Write ``count`` pictures of ``size`` as .mp4 (H.264) or .gif.
 
-    ``sample`` gives a picture with all colours of the film, for a GIF's palette (None: the first picture has them).
+    frames: gives the pictures of some numbers, in their order; it is called once the place is sure, for all of them,
+    and for a GIF before that for a few from all over the film, of which its palette is.
     """
     if _is_gif(path) and count > MAX_GIF_FRAMES:
         raise MotionloomError(f"a GIF of {count} frames is too long (at most {MAX_GIF_FRAMES}); write an .mp4 instead")
@@ -55,9 +56,9 @@ def write_film(
     ffmpeg = "" if _is_gif(path) else find_ffmpeg()
     with atomic_path(target) as temp:
         if _is_gif(path):
-            _write_gif(frames(), temp, rate, sample() if sample else None)
+            _write_gif(frames, temp, rate, count)
         else:
-            _write_mp4(frames(), temp, size, rate, ffmpeg=ffmpeg)
+            _write_mp4(frames(range(count)), temp, size, rate, ffmpeg=ffmpeg)
     return Path(path)
 
 
@@ -111,14 +112,22 @@ def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int],
             raise MotionloomError(f"ffmpeg could not write the film ({words[-1][:200]}); try another path or size")
 
 
-def _write_gif(frames: Iterator[Image.Image], path: Path, fps: float, sample: Image.Image | None) -> None:
+def _write_gif(frames: Callable[[Sequence[int]], Iterator[Image.Image]], path: Path, fps: float, count: int) -> None:
     """One palette for the whole film; frame times are whole hundredths of a second that add up to the true time."""
-    first = next(frames)
-    palette = first.quantize(128) if sample is None else sample.quantize(256)
-    pictures = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in itertools.chain([first], frames)]
+    chosen = np.unique(np.linspace(0, count - 1, SAMPLED).round().astype(int)).tolist()
+    palette = _palette(frames(chosen), len(chosen))
+    pictures = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in frames(range(count))]
     ends = np.round(np.arange(len(pictures) + 1) * 100 / fps).astype(int)
     durations = (np.maximum(np.diff(ends), 2) * 10).tolist()
     pictures[0].save(path, format="GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0)
+
+
+def _palette(pictures: Iterator[Image.Image], number: int) -> Image.Image:
+    """The colours of so many pictures, which are thinned: together they have no more points than one of them."""
+    step = int(np.ceil(np.sqrt(number)))
+    points = [np.asarray(picture)[::step, ::step].reshape(-1, 3) for picture in pictures]
+    together = Image.fromarray(np.concatenate(points)[None])
+    return together.quantize(256, Image.Quantize.MAXCOVERAGE)  # thin lines keep their own colours
 
 
 def suffixed(path: str | Path, suffixes: tuple[str, ...]) -> Path:

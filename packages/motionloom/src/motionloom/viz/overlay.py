@@ -151,13 +151,7 @@ def draw_scene(
     def film(times: Sequence[int]) -> Iterator[Image.Image]:
         return _film(Stage(actors, rate), panel, zero=zero, title=title, times=times)
 
-    def sample() -> Image.Image:
-        mosaic = Image.new("RGB", (panel[0], 3 * panel[1]))
-        for i, picture in enumerate(film([0, count // 2, count - 1])):
-            mosaic.paste(picture, (0, i * panel[1]))
-        return mosaic
-
-    return write_film(lambda: film(range(count)), target, panel, rate=rate, count=count, sample=sample)
+    return write_film(film, target, panel, rate=rate, count=count)
 
 
 def _check(actors: Sequence[Actor]) -> None:

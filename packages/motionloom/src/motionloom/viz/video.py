@@ -5,6 +5,7 @@ The floor's tiles are half a metre wide and stay in the world, so a sliding foot
 """
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -154,20 +155,26 @@ def draw_video(
     panel = film_size(size)
     count = max(1, *(round((len(m) - 1) / m.fps * rate) + 1 for m in motions))
 
-    def frames() -> Iterator[Image.Image]:
-        return _film([figure(m.resample(rate)) for m in motions], texts, panel, count)
+    @cache
+    def shapes() -> list[Figure]:
+        return [figure(m.resample(rate)) for m in motions]
+
+    def frames(numbers: Sequence[int]) -> Iterator[Image.Image]:
+        return _film(shapes(), texts, panel, numbers)
 
     return write_film(frames, path, panel, rate=rate, count=count)
 
 
-def _film(shapes: Sequence[Figure], texts: Sequence[str], size: tuple[int, int], count: int) -> Iterator[Image.Image]:
-    """The film's pictures, one after the other."""
+def _film(
+    shapes: Sequence[Figure], texts: Sequence[str], size: tuple[int, int], numbers: Sequence[int]
+) -> Iterator[Image.Image]:
+    """The film's pictures of these numbers, one after the other."""
     columns = len(shapes) if len(shapes) <= 3 else int(np.ceil(np.sqrt(len(shapes))))
     rows = -(-len(shapes) // columns)
     panel = (size[0] // columns, size[1] // rows)
     cameras = [_follow(shape, panel) for shape in shapes]
     seconds = max(s.seconds for s in shapes)
-    for k in range(count):
+    for k in numbers:
         picture = Image.new("RGB", size, draw.PAPER)
         for i, shape in enumerate(shapes):
             frame = min(k, len(shape) - 1)

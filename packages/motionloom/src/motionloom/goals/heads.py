@@ -1,0 +1,84 @@
+"""What a head does, in words: "nods twice", "shakes the head", "looks up and to the left", "looks around".
+
+Plain text work by a table. The features that weights learn hold no turn of the head, so nothing is sampled:
+`motionloom.kinematics.gaze` turns the head by what is read.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.blending import smoothstep
+from motionloom.errors import MotionloomError
+from motionloom.goals.numerals import in_digits
+
+Array = NDArray[np.float64]
+EASE = 0.4
+"""Seconds in which a head turns to the side, and back."""
+STROKE = {"nods": 0.7, "shakes": 0.8, "looks around": 3.0}
+"""Seconds of one nod, of once to and fro, and of once to both sides."""
+QUICKEST = 0.3
+"""Seconds: no head nods or is shaken more quickly."""
+_TO = (
+    (r"\bleft", (55, 0)),
+    (r"\bright", (-55, 0)),
+    (r"\bup|\bsky\b|\bceiling\b", (0, 30)),
+    (r"\bdown|\bfloor\b|\bground\b|\bfeet\b", (0, -35)),
+)
+"""Words, and the degrees to the left and up that they say."""
+_OFTEN = {"once": 1, "twice": 2, "thrice": 3}
+KNOWN = "nods, shakes, looks left, right, up or down, and looks around"
+
+
+@dataclass(frozen=True)
+class HeadMove:
+    """A move of the head from where it is."""
+
+    kind: str
+    """A key of `STROKE`, or ``looks``."""
+    left: float
+    """Degrees to the left, or to both sides."""
+    up: float
+    """Degrees up."""
+    times: int = 0
+    """How often; 0: as often as there is time for."""
+    pace: float = 1.0
+    """Seconds for each usual one."""
+
+    def at(self, time: Array, seconds: float) -> tuple[Array, Array]:
+        """Radians to the left and up (frames,) at times (frames,) from the beginning of so many seconds."""
+        ease = min(EASE * self.pace, seconds / 2)
+        share = smoothstep(np.minimum(time, seconds - time) / ease)
+        if self.kind in STROKE:
+            stroke = STROKE[self.kind] * self.pace
+            strokes = min(self.times, max(1, int(seconds / QUICKEST))) or max(1, round(seconds / stroke))
+            done = min(seconds, strokes * stroke) if self.times else seconds
+            phase = 2 * np.pi * strokes * np.clip(time / done, 0, 1)
+            if self.kind == "nods":
+                share = (1 - np.cos(phase)) / 2
+            else:
+                share = np.sin(phase) * smoothstep(np.minimum(time, done - time) / min(ease, done / 4))
+        return math.radians(self.left) * share, math.radians(self.up) * share
+
+
+def read_head(text: str) -> HeadMove:
+    """What words say of a head; raises `MotionloomError` for those that say nothing of it."""
+    said = in_digits(text)
+    often = re.search(r"\b(once|twice|thrice|(\d+) (?:times|nods|shakes))\b", said)
+    times = (int(often[2]) if often[2] else _OFTEN[often[1]]) if often else 0
+    pace = 1.5 if re.search(r"\bslow", said) else 0.7 if re.search(r"\b(?:quick|fast|rapid)", said) else 1.0
+    much = 0.5 if re.search(r"\b(?:slightly|a little|a bit)\b", said) else 1.0
+    if re.search(r"\bnod", said):
+        return HeadMove("nods", 0.0, -20.0 * much, times, pace)
+    if re.search(r"\bsh(?:ak|ook)", said):
+        return HeadMove("shakes", 25.0 * much, 0.0, times, pace)
+    if re.search(r"\baround|\bboth (?:ways|sides)|\bside to side|\bleft and right|\bleft then right", said):
+        return HeadMove("looks around", 55.0 * much, 0.0, times, pace)
+    found = [degrees for words, degrees in _TO if re.search(words, said)]
+    if not found:
+        raise MotionloomError(f"a head {KNOWN}; {text.strip()[:60]!r} says none of these")
+    left, up = np.sum(found, axis=0).tolist()
+    return HeadMove("looks", left * much, up * much, 0, pace)
