@@ -10,6 +10,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from motionloom.errors import MotionloomError
+from motionloom.server import films
 from motionloom.server.films import read
 from motionloom.viz.film import find_ffmpeg
 from tests.server.serving import PATIENCE, Server
@@ -88,6 +89,16 @@ def test_what_is_no_picture_of_the_film_is_reported(server: Server) -> None:
             _hear(socket)
             socket.send(data)
             assert sentence in _hear(socket)["error"]
+    assert not _left(server)
+
+
+def test_a_gif_takes_no_more_than_its_share_of_the_disk(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(films, "MAX_GIF_BYTES", len(_picture(0)))
+    with _open(server) as socket:
+        for number in range(2):
+            _hear(socket)
+            socket.send(_picture(number))
+        assert "choose a smaller size or MP4" in _hear(socket)["error"]
     assert not _left(server)
 
 

@@ -33,6 +33,8 @@ MAX_PICTURE = 16 << 20
 MAX_FPS = 60.0
 MAX_GIF_PIXELS = 250_000_000
 """Of all pictures of a GIF together, which is in memory until it is written."""
+MAX_GIF_BYTES = 1 << 30
+"""Of its pictures as they are sent, which are on the disk until it is written."""
 MOST = 2
 """Films that are written at the same time."""
 GOODBYE, REFUSED = 1000, 1008
@@ -166,15 +168,19 @@ def _write(pictures: _Pictures, part: Path) -> None:
 
     asked = pictures.asked
     with TemporaryFile(dir=part.parent) as file:
-        frames = _kept(pictures, file) if asked.format == "gif" else lambda _: map(asked.decoded, pictures)
+        frames = _on_disk(pictures, file) if asked.format == "gif" else lambda _: map(asked.decoded, pictures)
         write_film(frames, part, asked.size, rate=asked.fps, count=asked.count)
 
 
-def _kept(pictures: _Pictures, file: IO[bytes]) -> "Callable[[Sequence[int]], Iterator[Image.Image]]":
+def _on_disk(pictures: _Pictures, file: IO[bytes]) -> "Callable[[Sequence[int]], Iterator[Image.Image]]":
     """Pictures that can be seen again: a GIF's palette is of pictures from all over it."""
     ends = [0]
     for data in pictures:
         pictures.asked.decoded(data)
+        if ends[-1] + len(data) > MAX_GIF_BYTES:
+            raise MotionloomError(
+                f"the pictures of a GIF are over {MAX_GIF_BYTES >> 20} MB; choose a smaller size or MP4"
+            )
         ends.append(ends[-1] + file.write(data))
 
     def seen(numbers: Sequence[int]) -> "Iterator[Image.Image]":
