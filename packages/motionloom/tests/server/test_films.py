@@ -92,14 +92,14 @@ def test_what_is_no_picture_of_the_film_is_reported(server: Server) -> None:
     assert not _left(server)
 
 
-def test_a_gif_takes_no_more_than_its_share_of_the_disk(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(films, "MAX_GIF_BYTES", len(_picture(0)))
-    with _open(server) as socket:
-        for number in range(2):
-            _hear(socket)
-            socket.send(_picture(number))
-        assert "choose a smaller size or MP4" in _hear(socket)["error"]
-    assert not _left(server)
+def test_a_gif_takes_no_more_than_its_share_of_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Pictures(list[bytes]):
+        asked = films.Asked("gif", (96, 64), 20, 2)
+
+    sent = Pictures([_picture(0)[4:]] * 2)
+    monkeypatch.setattr(films, "MAX_GIF_BYTES", len(sent[0]))
+    with pytest.raises(MotionloomError, match="choose a smaller size or MP4"):
+        films._on_disk(sent, io.BytesIO())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
