@@ -148,3 +148,8 @@ def test_a_motion_with_nan_or_wrong_shapes_is_refused() -> None:
         Motion(SMPL22, 30.0, good.root, good.rotations, np.zeros((7, 3)))
     with pytest.raises(MotionloomError, match="frame rate"):
         Motion(SMPL22, 0.0, good.root, good.rotations)
+
+
+def test_a_printed_motion_is_one_line_without_its_numbers() -> None:
+    motion = Motion(SMPL22, 20.0, np.zeros((30, 3)), np.tile(rot.IDENTITY, (30, 22, 1)))
+    assert repr(motion) == "Motion(22 joints, 30 frames, 1.50 s at 20 per second)"

@@ -23,7 +23,7 @@ _LEFT_HIP, _RIGHT_HIP, _LEFT_SHOULDER, _RIGHT_SHOULDER = map(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """Poses of one skeleton at a constant frame rate."""
 
@@ -63,6 +63,12 @@ class Motion:
     def seconds(self) -> float:
         """Length in seconds: frames / fps."""
         return len(self) / self.fps
+
+    def __repr__(self) -> str:
+        """One line: thousands of numbers tell nobody what a motion is."""
+        return (
+            f"Motion({len(self.skeleton)} joints, {len(self)} frames, {self.seconds:.2f} s at {self.fps:g} per second)"
+        )
 
     def _repr_html_(self) -> str:
         """What a notebook shows of the motion: the viewer, in a frame (`motionloom.viz.page.framed`)."""
