@@ -194,13 +194,13 @@ def _work(words: list[str], folder: str, log: str, at: int, number: int) -> None
 def _command(words: list[str], marks: _Marks) -> int:
     from motionloom import cli
 
-    told = cli._told
+    report = cli._run_and_report
 
     def watched(argv: Sequence[str] | None) -> int:
         with marks.watching():
-            return told(argv)
+            return report(argv)
 
-    cli._told = watched
+    cli._run_and_report = watched
     try:
         return cli.main(words)
     except SystemExit as error:

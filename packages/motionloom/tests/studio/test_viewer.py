@@ -151,7 +151,7 @@ def test_a_notebooks_frame_shows_it(opened, tmp_path: Path) -> None:
     shown = opened(file)
     inside = shown.page.frame_locator("iframe")
     inside.locator("body[data-ready]").wait_for()
-    assert inside.locator(".clock").inner_text() == "0.00 / 2.00 s"
+    assert inside.locator(".clock").inner_text().endswith(" / 2.00 s")  # it plays at once
     assert not shown.faults
 
 
