@@ -74,6 +74,7 @@ def project_of(asked: dict[str, Any], kept: str) -> dict[str, Any]:
 
 def in_the_page(page: Studio, block: int, rounds: int) -> dict[str, float]:
     """Medians of so many changes of one block's words, and the longest task of the page."""
+    page.page.wait_for_timeout(3000)  # for the first picture of a page shaders are linked, which is no drawing
     page.page.evaluate(LONG_TASKS)
     times = []
     for number in range(rounds):
