@@ -107,6 +107,8 @@ class _Made:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = count, 1
         options.log_severity_level = 4
+        # threads that wait for the next call in a loop take the processors from NumPy's part between two calls
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         arrays = {name: np.ascontiguousarray(weights[name], np.float32) for name in names.weights}
         values = [onnxruntime.OrtValue.ortvalue_from_numpy(array) for array in arrays.values()]
         options.add_external_initializers(list(arrays), values)  # which copies them when the session is made
