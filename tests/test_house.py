@@ -39,7 +39,7 @@ BUDGETS = {
     "kinematics": 2_502,
     "viz": 2_374,
     "edits": 2_143,
-    "runtime": 2_059,
+    "runtime": 2_061,
     "requests": 1_536,
     "lab/evaluator": 1_486,
     "(top)": 1_447,
