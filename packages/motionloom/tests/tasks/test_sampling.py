@@ -77,7 +77,7 @@ def test_settled_states_are_smoothed_hold_what_is_observed_and_are_edited_once_m
     given = Observed(np.full(mask.shape, 0.5, np.float32), mask)
     rows, how = Rows(["a person walks"], [12], [3], slots=slots), Sampling(steps=3)
     [(_, plain)] = sample(prior, rows, how, observed=given)
-    [(_, made)] = sample(prior, rows, how, observed=given, edits=[edit], settled=True)
+    [(_, made)] = sample(prior, rows, how, observed=given, edits=[edit], corrected=True)
     smoothed = np.concatenate([plain[:slots], prior.smoothed(plain[slots:])])
     np.testing.assert_allclose(made, np.where(mask[0], 0.5, smoothed) + 1, atol=1e-5)
     assert np.abs(smoothed - plain).max() > 1e-3

@@ -47,7 +47,7 @@ def inpaint_motion(
         sampling,
         edits=[bent],
         observed=observed,
-        settled=True,
+        corrected=True,
         progress=progress,
         view=View(poses, begin=window.begin),
     )

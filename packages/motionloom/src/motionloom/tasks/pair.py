@@ -103,7 +103,7 @@ def pair_features(
             how,
             network=net,
             edits=[changed],
-            settled=True,
+            corrected=True,
             observed=given.observed,
             progress=progress,
             view=view,

@@ -110,7 +110,7 @@ def sample(
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
     halfway: bool = False,
-    settled: bool = False,
+    corrected: bool = False,
     progress: Progress | None = None,
     view: View | None = None,
 ) -> Iterator[tuple[int, State]]:
@@ -119,9 +119,9 @@ def sample(
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. guided: the guided
     denoiser of all rows, where it is not that of the network alone. edits: of each
     batch's guided denoiser, after what is observed was put in, the first one first. halfway: stop after half of the
-    calls and give the denoised estimates. settled: rows of one length are given `Prior.smoothed`, with what is observed
-    in its place, and through the edits once more, at level 0. view: how each network call is seen by who is `watching`;
-    None: nobody can.
+    calls and give the denoised estimates. corrected: rows of one length are given `Prior.smoothed`, with what is
+    observed in its place, and through the edits once more, at level 0. view: how each network call is seen by who is
+    `watching`; None: nobody can.
     Where the sampling asks for the best of several, each motion's seed is chosen first (`with_best_seeds`).
     Raises MotionloomError for more steps than the weights have levels.
     """
@@ -165,7 +165,7 @@ def sample(
             state, done = snapshot.clean if halfway else snapshot.state, done + 1
             if progress:
                 progress(done, len(batches) * (len(way) - 1))
-        if settled and not halfway:
+        if corrected and not halfway:
             frames = prior.smoothed(state[:, rows.slots :])
             state = denoise(np.concatenate([state[:, : rows.slots], frames], axis=1), 0)
         yield from ((number, one[:length]) for number, one, length in zip(numbers, state, lengths, strict=True))
