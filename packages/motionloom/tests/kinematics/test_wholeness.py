@@ -8,7 +8,7 @@ import pytest
 from motionloom import rotations as rot
 from motionloom.io import load
 from motionloom.kinematics.physics import J
-from motionloom.kinematics.wholeness import ENOUGH, angles, broken_frames, whole_frames, wholeness
+from motionloom.kinematics.wholeness import ENOUGH, angles, broken_frames, shoulders_below, whole_frames, wholeness
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.skeleton import SMPL22
 from tests.kinematics import people
@@ -85,6 +85,15 @@ def test_a_drawn_person_with_a_folded_pelvis_is_not_whole() -> None:
 )
 def test_a_joint_bent_as_nobody_bends_is_told(joints: list[str], pivot: str, degrees: float, part: str) -> None:
     assert part in wrong(turned(people.standing(0.1), joints, pivot, degrees))
+
+
+def test_shoulders_halfway_down_the_ribs_are_not_whole() -> None:
+    person = people.standing(0.1)
+    arms = [J[f"{side}_{joint}"] for side in ("left", "right") for joint in ("shoulder", "elbow", "wrist")]
+    low = person.copy()
+    low[:, arms, 1] -= 0.09
+    assert wrong(person) == set() and wrong(low) == {"shoulders"}
+    assert shoulders_below(low)[0] - shoulders_below(person)[0] == pytest.approx(0.09 / 0.55, abs=0.01)
 
 
 def test_knees_bend_to_the_back_and_elbows_to_the_front() -> None:

@@ -115,10 +115,10 @@ WITHOUT_COLLARS = ("animated_drawings", "quaternius_robot")
 
 @pytest.mark.parametrize(("path", "name", "fps"), TAKES, ids=[name for _, name, _ in TAKES])
 def test_shoulders_that_rest_are_where_a_persons_are(path: str, name: str, fps: float) -> None:
-    """Fitted people (accad, cmu, ui_prmd on the 22 joints) have them 6 to 10 cm below the neck joint."""
+    """Of fitted people (accad, cmu, ui_prmd on the 22 joints) they are 0.11 to 0.18 lengths of the spine below the neck."""
     place = shared(path)
     motion = load(place, fps=fps) if place.suffix == ".amc" else load(place)
     seen = shoulders_below(to_smpl22(motion).positions())
     if len(seen) < 10 or name.startswith(WITHOUT_COLLARS):
         pytest.skip("arms never hang, or there are no collar bones")
-    assert 0.05 < np.median(seen) < LOWEST_SHOULDERS - 0.01
+    assert 0.09 < np.median(seen) < LOWEST_SHOULDERS - 0.02

@@ -31,8 +31,9 @@ SHORT = 0.05
 """Lengths of the spine: a pelvis nearer to the middle of the hips, as some skeletons have it, is in line."""
 ENOUGH = 0.9
 """Share of the frames in which a whole body is whole."""
-RESTING, LOWEST_SHOULDERS = 0.25, 0.12
-"""Metres: both wrists are so far below the shoulders of arms that hang; shoulders that rest are less below the neck."""
+RESTING, LOWEST_SHOULDERS = 0.45, 0.22
+"""Lengths of the spine: both wrists of arms that hang are so far below the shoulders; shoulders at rest are less below
+the neck."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +75,14 @@ def angles(positions: np.ndarray) -> Angles:
 
 
 def shoulders_below(positions: np.ndarray) -> Array:
-    """(n,) metres down the trunk from the neck joint to the middle of the shoulders, of frames in which both arms hang.
+    """(n,) lengths of the spine down from the neck joint to the middle of the shoulders, where both arms hang.
 
-    Of people fitted to the 22 joints it is 0.06 to 0.1.
+    Of people fitted to the 22 joints it is 0.11 to 0.18.
     """
     p = np.asarray(positions, dtype=np.float64)
-    up, shoulders = p[:, J["neck"]] - p[:, 0], p[:, _SHOULDERS].mean(axis=1)
-    up /= np.linalg.norm(up, axis=-1, keepdims=True)
-    hang = (((shoulders[:, None] - p[:, _WRISTS]) * up[:, None]).sum(axis=-1) > RESTING).all(axis=1)
-    return np.asarray(((p[:, J["neck"]] - shoulders) * up).sum(axis=-1)[hang], dtype=np.float64)
+    back = _spine(p)
+    below, hang = _below_neck(p, back)
+    return below[hang] / back
 
 
 def whole_frames(positions: np.ndarray) -> NDArray[np.bool_]:
@@ -92,7 +92,7 @@ def whole_frames(positions: np.ndarray) -> NDArray[np.bool_]:
 
 
 def broken_frames(positions: np.ndarray) -> dict[str, NDArray[np.bool_]]:
-    """(frames,) bool by what is wrong: ``pelvis``, ``trunk``, ``head``, ``knees``, ``elbows``."""
+    """(frames,) bool by what is wrong: ``pelvis``, ``trunk``, ``head``, ``knees``, ``elbows``, ``shoulders``."""
     p = np.asarray(positions, dtype=np.float64)
     bend = angles(p)
     hips, shoulders, head = p[:, _HIPS].mean(axis=1), p[:, _SHOULDERS].mean(axis=1), p[:, J["head"]]
@@ -102,12 +102,14 @@ def broken_frames(positions: np.ndarray) -> dict[str, NDArray[np.bool_]]:
     at_hips = _between(hips[:, None] - p[:, _KNEES], trunk[:, None]).max(axis=1)
     bent = (at_hips > BENT) | (lean > UPRIGHT)
     length = np.linalg.norm(head - hips, axis=-1)
+    below, hang = _below_neck(p, back)
     found = {
         "pelvis": (bend.pelvis > np.where(bent, PELVIS_BENT, PELVIS)) & (rise > SHORT * back),
         "trunk": np.linalg.norm(trunk, axis=-1) < TRUNK * back,
         "head": (length < HEAD * back) | ((lean < UPRIGHT) & ((head - hips)[:, 1] < ABOVE * back)),
         "knees": ((bend.knees > KNEE) | (bend.knees < -KNEE_BACK)).any(axis=1),
         "elbows": (bend.elbows > ELBOW).any(axis=1),
+        "shoulders": hang & (below > LOWEST_SHOULDERS * back),
     }
     return {name: np.asarray(frames, dtype=np.bool_) for name, frames in found.items()}
 
@@ -122,6 +124,14 @@ _ANKLES, _TOES = (J["left_ankle"], J["right_ankle"]), (J["left_foot"], J["right_
 _SHOULDERS, _ELBOWS = (J["left_shoulder"], J["right_shoulder"]), (J["left_elbow"], J["right_elbow"])
 _WRISTS = (J["left_wrist"], J["right_wrist"])
 _BACK = (0, J["spine1"], J["spine2"], J["spine3"], J["neck"])
+
+
+def _below_neck(p: Array, back: float) -> tuple[Array, NDArray[np.bool_]]:
+    """(frames,) metres down the trunk from the neck to the middle of the shoulders, and whether both arms hang."""
+    up, shoulders = p[:, J["neck"]] - p[:, 0], p[:, _SHOULDERS].mean(axis=1)
+    up = up / np.maximum(np.linalg.norm(up, axis=-1, keepdims=True), 1e-9)
+    hang = (((shoulders[:, None] - p[:, _WRISTS]) * up[:, None]).sum(axis=-1) > RESTING * back).all(axis=1)
+    return ((p[:, J["neck"]] - shoulders) * up).sum(axis=-1), np.asarray(hang, dtype=np.bool_)
 
 
 def _spine(p: Array) -> float:
