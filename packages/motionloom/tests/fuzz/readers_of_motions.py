@@ -11,6 +11,7 @@ import numpy as np
 from motionloom import io
 from motionloom.io.character import load_character
 from motionloom.io.glb import read_document
+from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_read import load_glb_people
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
@@ -78,7 +79,7 @@ def hero(folder: Path) -> None:
 def carried(path: Path) -> None:
     """The character's meshes, and its own file with a motion in it."""
     character = load_character(path)
-    for surface in character.surfaces():
+    for surface in read_surfaces(character):
         assert np.isfinite(surface.points).all()
         assert np.isfinite(surface.weights).all()
         assert surface.triangles.max(initial=0) < len(surface.points)

@@ -32,7 +32,7 @@ def errors(before: Path, after: Path, clip: int, motion: Motion) -> dict[str, fl
     theirs = a.json["animations"][clip]
     was = a.worlds(theirs, a.span(theirs)[0] + frames / motion.fps)
     now = b.worlds(b.clip("ours"), frames / motion.fps)
-    parts, skeleton, nodes = joint_map(character.skeleton), character.skeleton, character.rig.nodes
+    parts, skeleton, nodes = joint_map(character.skeleton), character.skeleton, character.nodes
     drivers = parts.drivers(skeleton)
     found = {"twist": 0.0}
     for j in LIMBS:
@@ -40,7 +40,7 @@ def errors(before: Path, after: Path, clip: int, motion: Motion) -> dict[str, fl
         k = drivers[j]
         assert k is not None
         bone = skeleton.rest_positions()[child] - skeleton.rest_positions()[k]
-        axis = rot.rotate(rot.inverse(character.rig.turns[k]), bone / np.linalg.norm(bone))
+        axis = rot.rotate(rot.inverse(character.turns[k]), bone / np.linalg.norm(bone))
         found["twist"] = max(found["twist"], _twist(was[:, nodes[k]], now[:, nodes[k]], axis))
     skinned = [i for i, node in enumerate(a.nodes) if "skin" in node and "mesh" in node]
     if not skinned:

@@ -15,6 +15,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
+from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget
 from motionloom.skeleton import SMPL22
@@ -112,7 +113,7 @@ def test_a_mesh_with_fewer_bind_matrices_than_joints_is_left_out_and_told(tmp_pa
     hero = Hero()
     hero.json["accessors"][hero.json["skins"][0]["inverseBindMatrices"]]["count"] -= 1
     with pytest.warns(UserWarning, match="1 of its 1 pieces of mesh are left out"):
-        assert load_character(hero.write(tmp_path / "hero.glb")).surfaces(remark=True) == []
+        assert read_surfaces(load_character(hero.write(tmp_path / "hero.glb")), remark=True) == []
 
 
 def test_what_another_clip_moves_has_one_key_at_rest(tmp_path: Path) -> None:
@@ -161,7 +162,7 @@ def test_last_bones_may_be_stretched_or_mirrored_and_others_not(tmp_path: Path) 
 def test_soles_that_dip_raise_the_whole_character_but_no_leap(tmp_path: Path) -> None:
     """Heels that are 3 cm in the floor while toes are planted come out of it; 8 cm are a pose in the air and stay."""
     character = load_character(Hero().write(tmp_path / "hero.glb"))
-    rest = min(s.points[:, 1].min() for s in character.surfaces())
+    rest = min(s.points[:, 1].min() for s in read_surfaces(character))
     for angle, raised in ((-0.7, True), (-1.4, False)):
         turns = np.zeros((30, 22, 3))
         turns[:, [7, 8], 0] = angle
@@ -241,7 +242,7 @@ def test_feet_on_controls_are_carried_along(tmp_path: Path) -> None:
     made = retarget(motion, character.skeleton)
     out = character.save(made, tmp_path / "out.glb", name="ours")
     scene = Scene(out)
-    places = scene.worlds(scene.clip("ours"), np.arange(40) / 30.0)[..., :3, 3][:, list(character.rig.nodes)]
+    places = scene.worlds(scene.clip("ours"), np.arange(40) / 30.0)[..., :3, 3][:, list(character.nodes)]
     np.testing.assert_allclose(places, made.positions(), atol=1e-5)
 
 
@@ -346,5 +347,5 @@ def test_rigs_without_a_clip_get_one(tmp_path: Path, name: str) -> None:
         out = character.save(motion, tmp_path / f"out{path.suffix}", name="ours")
     check_only_one_animation_is_new(path, out)
     scene = Scene(out)
-    places = scene.worlds(scene.clip("ours"), np.arange(40) / 30.0)[..., :3, 3][:, list(character.rig.nodes)]
+    places = scene.worlds(scene.clip("ours"), np.arange(40) / 30.0)[..., :3, 3][:, list(character.nodes)]
     np.testing.assert_allclose(places, motion.positions(), atol=1e-4)

@@ -10,6 +10,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import load, save, save_scene
 from motionloom.io.character import load_character
+from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.usda import joint_paths, save_usda
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
@@ -105,7 +106,7 @@ def same_mesh(path: Path, folder: Path) -> float:
     """Metres by which USD's skinning of the .usda differs from glTF's of the character's own file, the largest."""
     character = load_character(path)
     motion = retarget(waver(), character.skeleton)
-    surfaces = character.surfaces()
+    surfaces = read_surfaces(character)
     assert surfaces
     ((query, skinned),) = queries(opened(save_usda([motion], folder / "out.usda", surfaces=surfaces)))
     assert np.abs(joints_at(query, 13) - motion.positions()[13]).max() < 1e-4
@@ -125,7 +126,7 @@ def test_a_mesh_that_cannot_be_read_is_said(tmp_path: Path) -> None:
     hero.json["accessors"][piece["attributes"]["POSITION"]]["sparse"] = {}
     character = load_character(hero.write(tmp_path / "hero.glb"))
     with pytest.warns(UserWarning, match="1 of its 1 pieces of mesh are left out"):
-        assert character.surfaces(remark=True) == []
+        assert read_surfaces(character, remark=True) == []
 
 
 @pytest.mark.parametrize("name", ["kaykit_knight", "sophia", "robot_expressive", "gdbot"])

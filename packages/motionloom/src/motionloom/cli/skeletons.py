@@ -17,6 +17,7 @@ from motionloom.io.asf import load_skeleton
 from motionloom.io.bvh import read_bvh
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.character import Character
+from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_read import open_glb
 from motionloom.io.stream import Kept, Stream
 from motionloom.motion import Motion, ground_pose
@@ -150,7 +151,8 @@ class Target:
         if self.character is not None and path.suffix.lower() == ".usda":
             from motionloom.io.usda import save_usda
 
-            return save_usda([motion], path, surfaces=self.character.surfaces(remark=True) or None)
+            surfaces = read_surfaces(self.character, remark=True)
+            return save_usda([motion], path, surfaces=surfaces or None)
         if self.plays_in(path):
             return self.save_page([(caption or "", [motion])], path)
         if path.suffix.lower() == ".bvh":

@@ -23,17 +23,16 @@ from motionloom.ground import GroundPose
 from motionloom.io.atomic import atomic_path
 from motionloom.io.glb import Document, pack_glb, read_document_chunks
 from motionloom.io.gltf_bind import on_floor
-from motionloom.io.gltf_mesh import Surface, read_surfaces
-from motionloom.io.gltf_nodes import Node, printable, upwards
-from motionloom.io.gltf_read import OpenedGlb, open_glb, without_still_armatures
-from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
+from motionloom.io.gltf_mesh import read_surfaces
+from motionloom.io.gltf_nodes import printable, upwards
+from motionloom.io.gltf_read import open_glb
+from motionloom.io.gltf_rig import Rig, parents_first, read_rig, worlds
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.joint_map import JointMap, Override
 from motionloom.retarget.joint_map import joint_map as find_joints
 from motionloom.retarget.stand import stand
 from motionloom.retarget.topology import ancestors, below
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 _SAME_TURN = 1e-7
@@ -41,21 +40,13 @@ _SAME_TURN = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Character:
-    """A humanoid in a glTF file."""
+class Character(Rig):
+    """A humanoid in a glTF file; motions that are written into the file are on its skeleton."""
 
     path: Path
-    file: OpenedGlb
-    nodes: list[Node]
-    rig: Rig
     joints: JointMap
     kept: object = None
     """What must stay as long as the character does: a folder with what its file became."""
-
-    @property
-    def skeleton(self) -> Skeleton:
-        """The skeleton that motions must have to be written into the file."""
-        return self.rig.skeleton
 
     @property
     def suffixes(self) -> tuple[str, ...]:
@@ -70,13 +61,9 @@ class Character:
         found = stand(read_body(self.skeleton, self.joints.names()))
         if self.file.document.items("skins"):
             return found
-        above = upwards(self.rig.nodes[0], self.file.parents)[:0:-1]
-        x, _, z = worlds(self.nodes, self.file.parents, above, {}).places[above[-1]][0] if above else np.zeros(3)
+        above = upwards(self.nodes[0], self.file.parents)[:0:-1]
+        x, _, z = worlds(self.file, above, {}).places[above[-1]][0] if above else np.zeros(3)
         return GroundPose(float(x), float(z), found.facing)
-
-    def surfaces(self, *, remark: bool = False) -> list[Surface]:
-        """The meshes of the file at rest, on `skeleton`; what is left out (compressed) is said with ``remark``."""
-        return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig, remark=remark)
 
     def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
         """Write the character's own file with one more animation: `save_clips` of one."""
@@ -105,101 +92,76 @@ class Character:
         new = _Insertion(document, self.file.document)
         animations = [] if replace else document.get("animations", [])
         taken = set() if replace else set(self.file.clips)
-        keys = [self._keys(motion) for motion, _ in clips]
-        moved = {(node, path_) for some in keys for node, path_, _ in some}
-        moved |= set() if replace else {key for channels in self.file.channels for key in channels}
+        keys, inside = [self._keys(motion) for motion, _ in clips], set(self.nodes)
+        moved = {(node, kind) for some in keys for node, kind, _ in some}
+        moved |= set() if replace else {key for channels in self.file.channels for key in channels if key[0] in inside}
         for (motion, name), own in zip(clips, keys, strict=True):
-            held = self._held(moved - {(node, path_) for node, path_, _ in own})
             name, numbers = name or "motion", count(2)
             free = name
             while free in taken:
                 free = f"{name}_{next(numbers)}"
-            animations.append(self._animation(new, motion, own, held) | {"name": free})
             taken.add(free)
-            for node, _, _ in own + held:
-                entry, rest = document["nodes"][node], self.nodes[node]
+            # without its rest Blender and Godot leave a node where the animation that was shown before had it
+            held = sorted(moved - {(node, kind) for node, kind, _ in own})
+            still = [(node, kind, self.file.nodes[node].rest[kind][None]) for node, kind in held]
+            animation: dict[str, Any] = {"name": free, "channels": [], "samplers": [], "extras": {"fps": motion.fps}}
+            clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
+            start = new.add(np.zeros((1, 1)), bounds=True) if held and len(motion) > 1 else clock
+            for node, kind, values in own + still:
+                times = clock if len(values) == len(motion) else start
+                animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
+                channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": kind}}
+                animation["channels"].append(channel)
+                entry = document["nodes"][node]
                 if entry.pop("matrix", None) is not None:  # of an animated node it must not be (glTF 2.0, 3.6.1)
-                    turn = np.roll(rest.turn, -1).tolist()
-                    entry |= {"translation": rest.place.tolist(), "rotation": turn, "scale": rest.scale.tolist()}
+                    entry |= {part: rest.tolist() for part, rest in self.file.nodes[node].rest.items()}
+            animations.append(animation)
         document["animations"] = animations
         with atomic_path(path) as temporary:
             temporary.write_bytes(new.packed(self.path))
         return path
 
-    def _animation(
-        self,
-        new: "_Insertion",
-        motion: Motion,
-        keys: list[tuple[int, str, Array]],
-        held: list[tuple[int, str, Array]],
-    ) -> dict[str, Any]:
-        """The JSON of a motion's channels, and of what is held at rest, whose numbers are added to ``new``."""
-        animation: dict[str, Any] = {"name": "", "channels": [], "samplers": [], "extras": {"fps": motion.fps}}
-        clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
-        start = new.add(np.zeros((1, 1)), bounds=True) if held and len(motion) > 1 else clock
-        for node, path, values in keys + held:
-            times = clock if len(values) == len(motion) else start
-            animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
-            channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": path}}
-            animation["channels"].append(channel)
-        return animation
-
     def _keys(self, motion: Motion) -> list[tuple[int, str, Array]]:
-        """Node, path and values (frames, width) of every channel."""
-        rig, parents = self.rig, self.file.parents
-        driven = {d for d in self.joints.drivers(self.skeleton) if d is not None}
-        above_driven = {a for d in driven for a in ancestors(self.skeleton, d)}
+        """Node, path and values (frames, width) of every channel.
+
+        Places are keyed of joints whose nodes do not say them: the root, those on a control, of the body those that the
+        file has in a pose.
+        """
+        parents, skeleton = self.file.parents, self.skeleton
+        slots = {n: k for k, n in enumerate(self.nodes)}
+        driven = {d for d in self.joints.drivers(skeleton) if d is not None}
+        above_driven = {a for d in driven for a in ancestors(skeleton, d)}
         turned = set(np.flatnonzero((1 - np.abs(motion.rotations[..., 0]) > _SAME_TURN).any(axis=0)).tolist())
-        slots = {n: k for k, n in enumerate(rig.nodes)}
-        above = upwards(rig.nodes[0], parents)[:0:-1]
-        wanted = rot.multiply(motion.world_rotations(), rig.turns)
-        places, free = motion.positions(), self._free(motion, driven | above_driven)
-        now = worlds(self.nodes, parents, above, {})
+        free = {0, *(self.shifted & (driven | above_driven))}
+        free |= {k for k, n in enumerate(self.nodes) if k and slots[parents[n]] != skeleton.parents[k]}
+        if motion.translations is not None:
+            apart = np.abs(motion.translations - skeleton.offsets).max(axis=(0, 2)) > 1e-5
+            free |= set(np.flatnonzero(apart).tolist())
+        wanted, places = rot.multiply(motion.world_rotations(), self.turns), motion.positions()
+        now = worlds(self.file, upwards(self.nodes[0], parents)[:0:-1], {})
         keys: list[tuple[int, str, Array]] = []
-        for n in parents_first(frozenset(rig.nodes), parents):
-            k, node, p = slots[n], self.nodes[n], parents[n]
-            turn = wanted[:, k] if p < 0 else rot.multiply(rot.inverse(now.turns[p]), wanted[:, k])
+        for n in parents_first(frozenset(self.nodes), parents):
+            k, node, p = slots[n], self.file.nodes[n], parents[n]
+            turn, place = wanted[:, k], places[:, k]
+            if p >= 0:
+                back, linear, place = rot.inverse(now.turns[p]), now.linear[p], place - now.places[p]
+                turn = rot.multiply(back, turn)
+                if linear is None:
+                    place = rot.rotate(back, place)
+                elif k in free:
+                    place = np.asarray(np.linalg.solve(linear, place[..., None])[..., 0], dtype=np.float64)
             turn = rot.unroll(rot.normalize(turn))
-            still = (1 - np.abs(turn @ node.turn) < _SAME_TURN).all()
             sampled: dict[tuple[int, str], Array] = {}
+            still = (1 - np.abs(turn @ node.turn) < _SAME_TURN).all()
             if k in driven or k in turned or (k in above_driven and not still):
                 sampled[n, "rotation"] = turn
                 keys.append((n, "rotation", np.roll(turn, -1, axis=-1)))
-            if k in free:
-                place = places[:, k] if p < 0 else _inside(now, p, places[:, k])
-                if k == 0 or np.abs(place - node.place).max() > 1e-5 * max(1.0, np.abs(node.place).max()):
-                    sampled[n, "translation"] = place
-                    keys.append((n, "translation", place))
-            now = worlds(self.nodes, parents, [n], sampled, above=now)
+            away = 1e-5 * max(1.0, np.abs(node.place).max())
+            if k == 0 or (k in free and np.abs(place - node.place).max() > away):
+                sampled[n, "translation"] = place
+                keys.append((n, "translation", place))
+            now = worlds(self.file, [n], sampled, above=now)
         return keys
-
-    def _held(self, moved: set[tuple[int, str]]) -> list[tuple[int, str, Array]]:
-        """The rest, once, of the channels that other animations move and this one does not.
-
-        Without it Blender and Godot would leave such a node where the animation that was shown before had it.
-        """
-        inside = set(self.rig.nodes)
-        rest = {
-            (n, path): {
-                "translation": self.nodes[n].place,
-                "rotation": np.roll(self.nodes[n].turn, -1),
-                "scale": self.nodes[n].scale,
-            }[path]
-            for n, path in moved
-            if n in inside
-        }
-        return [(n, path, value[None]) for (n, path), value in sorted(rest.items(), key=lambda item: item[0])]
-
-    def _free(self, motion: Motion, body: set[int]) -> set[int]:
-        """Joints whose places their nodes do not say: the root, those on a control, those of the ``body`` in a pose."""
-        rig, parents = self.rig, self.file.parents
-        slots = {n: k for k, n in enumerate(rig.nodes)}
-        free = {0, *(rig.shifted & body)}
-        free |= {k for k, n in enumerate(rig.nodes) if k and slots[parents[n]] != self.skeleton.parents[k]}
-        if motion.translations is not None:
-            apart = np.abs(motion.translations - self.skeleton.offsets).max(axis=(0, 2)) > 1e-5
-            free |= set(np.flatnonzero(apart).tolist())
-        return free
 
 
 def load_character(path: str | Path, *, joint_map: Override | None = None) -> Character:
@@ -211,14 +173,13 @@ def load_character(path: str | Path, *, joint_map: Override | None = None) -> Ch
     file = open_glb(path)
     problem: MotionloomError | None = None
     for person in range(len(file.people)):
-        nodes, joints, _ = without_still_armatures(file, person, {})
-        rig = read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset())
+        rig = read_rig(file, person, {})
         try:
             found = find_joints(rig.skeleton, joint_map)
         except MotionloomError as error:
             problem = problem or error
         else:
-            character = Character(path, file, nodes, rig, found)
+            character = Character(rig.file, rig.skeleton, rig.nodes, rig.turns, rig.shifted, path, found)
             _remark_on_what_stays(character)
             return _with_soles(character)
     assert problem is not None
@@ -268,27 +229,19 @@ def _with_soles(character: Character) -> Character:
     feet = {skeleton.index(name) for j in (7, 8, 10, 11) for name, weight in character.joints.points[j] if weight}
     feet = below(skeleton, feet)
     down = rot.rotate(rot.shortest_arc(np.array([0.0, 1.0, 0.0]), up), _DOWN)
-    points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in character.surfaces()]
+    meshed = read_surfaces(character)
+    points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in meshed]
     for j in sorted(feet):
         own = np.concatenate([places[of == j] for places, of in points] or [np.zeros((0, 3))]) - rest[j]
         if len(own):
             found[j] = own[np.unique((own @ down.T).argmax(axis=0))]
     if meshes and not points:
         _remark_on_soles(character, "has meshes that are compressed (Draco, meshopt) or stored in an unusual way")
-    return replace(character, rig=replace(character.rig, skeleton=replace(skeleton, soles=found)))
+    return replace(character, skeleton=replace(skeleton, soles=found))
 
 
 def _remark_on_soles(character: Character, why: str) -> None:
     warnings.warn(f"{character.path} {why}, so that its soles are not known and may dip into the floor", stacklevel=4)
-
-
-def _inside(now: Worlds, node: int, place: Array) -> Array:
-    """(frames, 3) world places in the frame of a node."""
-    apart, linear = place - now.places[node], now.linear[node]
-    if linear is None:
-        return rot.rotate(rot.inverse(now.turns[node]), apart)
-    solved = np.linalg.solve(np.broadcast_to(linear, (len(apart), 3, 3)), apart[..., None])
-    return np.asarray(solved[..., 0], dtype=np.float64)
 
 
 class _Insertion:

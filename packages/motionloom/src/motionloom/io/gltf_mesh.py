@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document
-from motionloom.io.gltf_bind import transform
-from motionloom.io.gltf_nodes import Node, printable, upwards
+from motionloom.io.gltf_bind import transform, world_from_nodes
+from motionloom.io.gltf_nodes import printable, upwards
 from motionloom.io.gltf_rig import Rig, worlds
 
 Array = NDArray[np.float64]
@@ -18,6 +18,8 @@ Whole = NDArray[np.int64]
 MAX_PIECES = 4096
 MAX_VERTICES = 2_000_000
 GREY = (0.6, 0.6, 0.6)
+Rest = dict[int, tuple[int | None, Array]]
+"""Of every node the joint that carries it, None for what does not hang on the skeleton, and (4, 4) world_from_node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +43,23 @@ class Surface:
     """Red, green, blue, linear, 0 to 1."""
 
 
-def read_surfaces(
-    document: Document, nodes: list[Node], parents: list[int], rig: Rig, *, remark: bool = False
-) -> list[Surface]:
+def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
     """The meshes that hang on a rig, skinned or not, in the rig's rest pose.
 
     What is compressed (Draco, meshopt) or stored in another unusual way is left out, so that the list may be empty;
     ``remark``: with a warning.
     Raises `MotionloomError` for a file that declares more than memory should hold.
     """
-    rest = _Rest(nodes, parents, rig)
+    file, document, known = rig.file, rig.file.document, dict[int, Array]()
+    linear = worlds(file, [*upwards(rig.nodes[0], file.parents)[:0:-1], *rig.nodes], {}).linear
+    for n, place, turn in zip(rig.nodes, rig.skeleton.rest_positions(), rig.turns, strict=True):
+        whole = linear[n]
+        size = 1.0 if whole is None else float(np.cbrt(np.linalg.det(whole[0])))
+        known[n] = transform(place, turn, np.full(3, size))
+    joints: dict[int, int | None] = {n: k for k, n in enumerate(rig.nodes)}
+    for n in file.order:
+        joints.setdefault(n, joints.get(file.parents[n]))
+    rest = {n: (joints[n], matrix) for n, matrix in world_from_nodes(file, file.order, known).items()}
     found: list[Surface] = []
     pieces = vertices = unread = 0
     for number, entry in enumerate(document.items("nodes")):
@@ -78,41 +87,8 @@ def read_surfaces(
     return found
 
 
-class _Rest:
-    """Where nodes are in a rig's rest pose, and which joint carries each."""
-
-    def __init__(self, nodes: list[Node], parents: list[int], rig: Rig) -> None:
-        self.nodes, self.parents = nodes, parents
-        self.slots = {n: k for k, n in enumerate(rig.nodes)}
-        self._known: dict[int, Array] = {}
-        line = [*upwards(rig.nodes[0], parents)[:0:-1], *rig.nodes]
-        linear = worlds(nodes, parents, line, {}).linear
-        for k, (n, place) in enumerate(zip(rig.nodes, rig.skeleton.rest_positions())):
-            whole = linear[n]
-            size = 1.0 if whole is None else float(np.cbrt(np.linalg.det(whole[0])))
-            self._known[n] = transform(place, rig.turns[k], np.full(3, size))
-
-    def matrix(self, node: int) -> Array:
-        """(4, 4) world_from_node."""
-        line = []
-        while node >= 0 and node not in self._known:
-            line.append(node)
-            node = self.parents[node]
-        found = self._known.get(node, np.eye(4))
-        for n in reversed(line):
-            own = self.nodes[n]
-            found = self._known[n] = found @ transform(own.place, own.turn, own.scale)
-        return found
-
-    def joint(self, node: int) -> int | None:
-        """The skeleton's joint that carries a node; None for what does not hang on the skeleton."""
-        while node >= 0 and node not in self.slots:
-            node = self.parents[node]
-        return self.slots.get(node)
-
-
 def _surface(
-    document: Document, entry: dict[str, Any], number: int, piece: dict[str, Any], rest: _Rest
+    document: Document, entry: dict[str, Any], number: int, piece: dict[str, Any], rest: Rest
 ) -> Surface | None:
     attributes = piece.get("attributes")
     if not isinstance(attributes, dict) or piece.get("mode", 4) != 4:
@@ -147,19 +123,19 @@ def _optional(document: Document, number: Any, kind: str, count: int) -> Array |
 
 
 def _influences(
-    document: Document, entry: dict[str, Any], number: int, attributes: dict[str, Any], count: int, rest: _Rest
+    document: Document, entry: dict[str, Any], number: int, attributes: dict[str, Any], count: int, rest: Rest
 ) -> tuple[Whole, Array, Array] | None:
     """Joints and weights (vertices, k), and world_from_mesh at rest (vertices, k, 4, 4) as each of them carries it."""
     if entry.get("skin") is None:
-        joint = rest.joint(number)
+        joint, matrix = rest[number]
         if joint is None:
             return None
-        moves = np.broadcast_to(rest.matrix(number), (count, 1, 4, 4))
+        moves = np.broadcast_to(matrix, (count, 1, 4, 4))
         return np.full((count, 1), joint), np.ones((count, 1)), moves
     skins = document.items("skins")
     skin = skins[document.index(entry["skin"], len(skins), "skins")]
-    listed = [document.index(n, len(rest.nodes), "nodes") for n in skin.get("joints", [])]
-    carriers = [rest.joint(n) for n in listed]
+    listed = [document.index(n, len(rest), "nodes") for n in skin.get("joints", [])]
+    carriers = [rest[n][0] for n in listed]
     if not listed or None in carriers:
         return None
     binds = np.tile(np.eye(4), (len(listed), 1, 1))
@@ -168,7 +144,7 @@ def _influences(
         binds = flat.reshape(-1, 4, 4).transpose(0, 2, 1)[: len(listed)]
         if len(binds) < len(listed):
             raise document.bad(f"a skin has {len(listed)} joints and {len(binds)} inverse bind matrices")
-    moves = np.array([rest.matrix(n) @ bind for n, bind in zip(listed, binds, strict=True)])
+    moves = np.array([rest[n][1] @ bind for n, bind in zip(listed, binds, strict=True)])
     sets = [k for k in range(8) if f"JOINTS_{k}" in attributes]
     which = [document.accessor(attributes[f"JOINTS_{k}"], "VEC4", "the joints of a mesh") for k in sets]
     shares = [document.accessor(attributes.get(f"WEIGHTS_{k}"), "VEC4", "the weights of a mesh") for k in sets]

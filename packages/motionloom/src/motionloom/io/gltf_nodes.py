@@ -1,14 +1,17 @@
 """The nodes of a glTF file: their names, their tree and their transforms at rest."""
 
+import warnings
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document
-from motionloom.io.gltf_curves import unit_quaternions
+from motionloom.io.gltf_curves import declared_fps, unit_quaternions
 
 Array = NDArray[np.float64]
 MAX_NODES = 20_000
@@ -26,6 +29,73 @@ class Node:
     """(4,) w, x, y, z."""
     scale: Array
     """(3,)"""
+
+    @property
+    def rest(self) -> dict[str, Array]:
+        """The transform as glTF writes it, by the path of a channel."""
+        return {"translation": self.place, "rotation": np.roll(self.turn, -1), "scale": self.scale}
+
+
+@dataclass(frozen=True)
+class OpenedGlb:
+    """A file's nodes, what moves them, and the joints of each person."""
+
+    document: Document
+    nodes: list[Node]
+    parents: list[int]
+    order: list[int]
+    """All nodes, parents before children."""
+    channels: list[dict[tuple[int, str], dict[str, Any]]]
+    skins: list[list[int]]
+    """The joints of every skin."""
+    humanoid: dict[str, int]
+    """The nodes of body parts, in files that name them."""
+    clips: list[str]
+    """The names of the animations, ``""`` where one has none."""
+    people: list[frozenset[int]]
+
+    @property
+    def lengths(self) -> list[tuple[str, float]]:
+        """Name and seconds of each animation."""
+        found = []
+        for name, animation in zip(self.clips, self.document.items("animations")):
+            ends = [self._end(sampler) for sampler in self.document.items("samplers", animation)]
+            found.append((name, max(ends, default=0.0)))
+        return found
+
+    def _end(self, sampler: dict[str, Any]) -> float:
+        """When the keys of a sampler end, as its accessor says."""
+        accessors = self.document.items("accessors")
+        bounds = accessors[self.document.index(sampler.get("input"), len(accessors), "accessors")].get("max")
+        right = isinstance(bounds, list) and len(bounds) == 1 and isinstance(bounds[0], int | float)
+        return float(bounds[0]) if isinstance(bounds, list) and right else 0.0
+
+    def chosen(self, clip: int | str | None, person: int) -> int | None:
+        """The number, from 0, of the animation to read; None where nothing moves the person."""
+        clips = self.clips
+        if clip is None:
+            moving = [k for k, a in enumerate(self.channels) if any(node in self.people[person] for node, _ in a)]
+            ours = [k for k in moving if declared_fps(self.document.items("animations")[k]) is not None]
+            chosen = ours[-1:] or moving[:1]  # a character comes back with what was made last for it
+            if len(moving) > 1:
+                name = f"number {chosen[0] + 1}" + (f", {clips[chosen[0]]!r}" if clips[chosen[0]] else "")
+                newest = ", the newest of this program's," if ours else ","
+                warnings.warn(
+                    f"{self.document.name} has {len(moving)} clips and none was chosen; {name}{newest} is read (--clip "
+                    "picks another by its name or number, info lists them)",
+                    stacklevel=3,
+                )
+            return chosen[0] if chosen else None
+        if str(clip) in clips:
+            return clips.index(str(clip))
+        number = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 9) else 0
+        if not 1 <= number <= len(clips):
+            listed = ", ".join(f"{k} {name!r}" for k, name in enumerate(clips[:20], start=1))
+            more = f" and {len(clips) - 20} more" if len(clips) > 20 else ""
+            near = get_close_matches(str(clip), clips, n=1)
+            meant = f"did you mean {near[0]!r}? There" if near else "there"
+            raise MotionloomError(f"{self.document.name} has no clip {clip!r}; {meant} are {listed or 'none'}{more}")
+        return number - 1
 
 
 def read_nodes(document: Document) -> list[Node]:
@@ -75,25 +145,20 @@ def _decompose(document: Document, values: Array, what: str) -> tuple[Array, Arr
     return matrix[:3, 3].copy(), rot.matrix_to_quat(turn), scale
 
 
-def read_parents(document: Document, nodes: list[Node]) -> list[int]:
-    """The parent of each node, -1 at the top; raises `MotionloomError` where the nodes are no trees."""
+def read_parents(document: Document, nodes: list[Node]) -> tuple[list[int], list[int]]:
+    """The parent of each node, -1 at the top, and all nodes, parents first; raises `MotionloomError` for no trees."""
     parents = [-1] * len(nodes)
     for i, node in enumerate(nodes):
         for child in node.children:
             if parents[child] != -1:
                 raise document.bad(f"node {child} has two parents")
             parents[child] = i
-    if len(downwards(nodes, parents)) != len(nodes):
-        raise document.bad("its nodes form a circle")
-    return parents
-
-
-def downwards(nodes: list[Node], parents: list[int]) -> list[int]:
-    """All nodes that hang on a top node, parents before children."""
     order = [i for i, p in enumerate(parents) if p == -1]
     for i in order:  # grows while it is walked
         order.extend(nodes[i].children)
-    return order
+    if len(order) != len(nodes):
+        raise document.bad("its nodes form a circle")
+    return parents, order
 
 
 def upwards(node: int, parents: list[int]) -> list[int]:

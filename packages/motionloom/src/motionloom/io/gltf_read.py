@@ -1,22 +1,15 @@
 """From a glTF document to a `Motion`: which nodes are a person, their rest pose, and their channels through time."""
 
-import warnings
-from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document, read_document
-from motionloom.io.gltf_curves import Curve, Curves, channels_of, clock, declared_fps, read_curves
-from motionloom.io.gltf_nodes import Node, downwards, printable, read_nodes, read_parents, upwards
+from motionloom.io.gltf_curves import channels_of, clock, declared_fps, read_curves
+from motionloom.io.gltf_nodes import Node, OpenedGlb, printable, read_nodes, read_parents, upwards
 from motionloom.io.gltf_rig import humanoid_nodes, posed, read_rig
 from motionloom.motion import Motion
 
-MAX_JOINTS = 10_000
 MAX_SKINS = 64
 
 
@@ -43,99 +36,37 @@ def load_glb_people(path: str | Path, *, clip: int | str | None = None) -> list[
     return [_motion(file, person, file.chosen(clip, person)) for person in range(len(file.people))]
 
 
-@dataclass(frozen=True)
-class OpenedGlb:
-    """A file's nodes, what moves them, and the joints of each person."""
-
-    document: Document
-    nodes: list[Node]
-    parents: list[int]
-    channels: list[dict[tuple[int, str], dict[str, Any]]]
-    people: list[frozenset[int]]
-
-    @property
-    def clips(self) -> list[str]:
-        """The names of the animations, ``""`` where one has none."""
-        return [printable(animation.get("name")) for animation in self.document.items("animations")]
-
-    @property
-    def lengths(self) -> list[tuple[str, float]]:
-        """Name and seconds of each animation."""
-        found = []
-        for name, animation in zip(self.clips, self.document.items("animations")):
-            ends = [self._end(sampler) for sampler in self.document.items("samplers", animation)]
-            found.append((name, max(ends, default=0.0)))
-        return found
-
-    def _end(self, sampler: dict[str, Any]) -> float:
-        """When the keys of a sampler end, as its accessor says."""
-        accessors = self.document.items("accessors")
-        bounds = accessors[self.document.index(sampler.get("input"), len(accessors), "accessors")].get("max")
-        right = isinstance(bounds, list) and len(bounds) == 1 and isinstance(bounds[0], int | float)
-        return float(bounds[0]) if isinstance(bounds, list) and right else 0.0
-
-    def chosen(self, clip: int | str | None, person: int) -> int | None:
-        """The number, from 0, of the animation to read; None where nothing moves the person."""
-        clips = self.clips
-        if clip is None:
-            moving = [k for k, a in enumerate(self.channels) if any(node in self.people[person] for node, _ in a)]
-            ours = [k for k in moving if declared_fps(self.document.items("animations")[k]) is not None]
-            chosen = ours[-1:] or moving[:1]  # a character comes back with what was made last for it
-            if len(moving) > 1:
-                name = f"number {chosen[0] + 1}" + (f", {clips[chosen[0]]!r}" if clips[chosen[0]] else "")
-                newest = ", the newest of this program's," if ours else ","
-                warnings.warn(
-                    f"{self.document.name} has {len(moving)} clips and none was chosen; {name}{newest} is read (--clip "
-                    "picks another by its name or number, info lists them)",
-                    stacklevel=3,
-                )
-            return chosen[0] if chosen else None
-        if str(clip) in clips:
-            return clips.index(str(clip))
-        number = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 9) else 0
-        if not 1 <= number <= len(clips):
-            listed = ", ".join(f"{k} {name!r}" for k, name in enumerate(clips[:20], start=1))
-            more = f" and {len(clips) - 20} more" if len(clips) > 20 else ""
-            near = get_close_matches(str(clip), clips, n=1)
-            meant = f"did you mean {near[0]!r}? There" if near else "there"
-            raise MotionloomError(f"{self.document.name} has no clip {clip!r}; {meant} are {listed or 'none'}{more}")
-        return number - 1
-
-
 def open_glb(path: str | Path) -> OpenedGlb:
     """Read a file up to its animations' keys; raises `MotionloomError` for everything that is wrong with it."""
     document = read_document(path)
     nodes = read_nodes(document)
-    parents = read_parents(document, nodes)
+    parents, order = read_parents(document, nodes)
     channels = channels_of(document, len(nodes))
-    return OpenedGlb(document, nodes, parents, channels, _people(document, nodes, parents, channels))
+    skins, humanoid = _skins(document, len(nodes)), humanoid_nodes(document, len(nodes))
+    clips = [printable(animation.get("name")) for animation in document.items("animations")]
+    file = OpenedGlb(document, nodes, parents, order, channels, skins, humanoid, clips, [])
+    return replace(file, people=_people(file))
 
 
 def _motion(file: OpenedGlb, person: int, clip: int | None) -> Motion:
-    document, parents = file.document, file.parents
+    document, joints = file.document, file.people[person]
     moved = {} if clip is None else file.channels[clip]
-    joints = file.people[person]
     curves = read_curves(document, {key: sampler for key, sampler in moved.items() if key[0] in joints})
-    nodes, joints, curves = without_still_armatures(file, person, curves)
+    rig = read_rig(file, person, curves)
+    kept = set(rig.nodes)
+    curves = {key: curve for key, curve in curves.items() if key[0] in kept}
     declared = None if clip is None else declared_fps(document.items("animations")[clip])
-    fps, times = clock(document, curves, len(joints), declared)
-    turned = {node for node, path in curves if path == "rotation"}
-    tips = frozenset(n for n in joints if curves and not joints.intersection(nodes[n].children) and n not in turned)
-    rig = read_rig(document, nodes, parents, joints=joints, tips=tips)
-    return posed(rig, document, nodes, parents, curves=curves, fps=fps, times=times)
+    fps, times = clock(document, curves, len(rig.nodes), declared)
+    return posed(rig, curves, fps=fps, times=times)
 
 
 # --- who is a person ----------------------------------------------------------------------------------------------
 
 
-def _people(
-    document: Document, nodes: list[Node], parents: list[int], channels: list[dict[tuple[int, str], dict[str, Any]]]
-) -> list[frozenset[int]]:
+def _people(file: OpenedGlb) -> list[frozenset[int]]:
     """The joints of each person, the topmost included."""
-    animated = {node for animation in channels for node, _ in animation}
-    skins = _skins(document, len(nodes))
-    known = set(humanoid_nodes(document, len(nodes)).values())
-    order = downwards(nodes, parents)
+    order, parents, skins, known = file.order, file.parents, file.skins, set(file.humanoid.values())
+    animated = {node for animation in file.channels for node, _ in animation}
     if skins:  # a skin in several trees is the person in the one with most of its joints
         groups = [max(_groups(set(skin), order, parents), key=len) for skin in skins]
     else:
@@ -143,13 +74,15 @@ def _people(
     if skins and known:
         groups = [max(_groups(known, order, parents), key=len), *groups]
     if not groups:
-        raise document.bad("it holds neither a skeleton (skin) nor an animation of nodes; export it with its armature")
+        raise file.document.bad(
+            "it holds neither a skeleton (skin) nor an animation of nodes; export it with its armature"
+        )
     marked = animated.union(*groups)
     people: dict[int, set[int]] = {}
     for group in groups:
         root = [n for n in upwards(group[0], parents) if n in marked or n == group[0]][-1]
         people.setdefault(root, {root}).update(group)
-    return [_body(root, wanted | animated | known, nodes, whole=not skins) for root, wanted in people.items()]
+    return [_body(root, wanted | animated | known, file.nodes, whole=not skins) for root, wanted in people.items()]
 
 
 def _skins(document: Document, count: int) -> list[list[int]]:
@@ -186,35 +119,6 @@ def _groups(nodes: set[int], order: list[int], parents: list[int]) -> list[list[
             root = parents[root]
         result.append([root, *group])
     return result
-
-
-def without_still_armatures(file: OpenedGlb, person: int, curves: Curves) -> tuple[list[Node], frozenset[int], Curves]:
-    """Let go of armature objects over the skeleton that are keyed but never move: they become fixed transforms."""
-    joints, parents = file.people[person], file.parents
-    if len(joints) > MAX_JOINTS:
-        raise file.document.bad(f"its skeleton has {len(joints)} joints; at most {MAX_JOINTS} can be read")
-    kept = {j for skin in _skins(file.document, len(file.nodes)) for j in skin} or joints
-    nodes = list(file.nodes)
-    by_node: dict[int, dict[str, Curve]] = {}
-    for (node, path), curve in curves.items():
-        by_node.setdefault(node, {})[path] = curve
-    root = next(n for n in joints if parents[n] not in joints)
-    gone: set[int] = set()
-    while True:
-        inside = [c for c in nodes[root].children if c in joints]
-        own = by_node.get(root, {})
-        still = all(np.ptp(c.values, axis=0).max() < 1e-6 * max(1.0, np.abs(c.values).max()) for c in own.values())
-        if root in kept or len(inside) != 1 or not still:
-            return nodes, joints - gone, {key: curve for key, curve in curves.items() if key[0] not in gone}
-        held = {path: curve.values[0] for path, curve in own.items()}
-        nodes[root] = replace(
-            nodes[root],
-            place=held.get("translation", nodes[root].place),
-            turn=rot.normalize(held.get("rotation", nodes[root].turn)),
-            scale=held.get("scale", nodes[root].scale),
-        )
-        gone.add(root)
-        root = inside[0]
 
 
 def _body(root: int, wanted: set[int], nodes: list[Node], *, whole: bool) -> frozenset[int]:

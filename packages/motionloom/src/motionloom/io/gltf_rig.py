@@ -7,7 +7,7 @@ so a bone keeps its roll. At rest means as the mesh was bound, or, without a mes
 
 import heapq
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -16,14 +16,15 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.io.glb import Document
-from motionloom.io.gltf_bind import SAME_PLACE, SAME_TURN, angle, bind_pose, on_floor, turn_of
+from motionloom.io.gltf_bind import SAME_PLACE, SAME_TURN, bind_pose, on_floor
 from motionloom.io.gltf_curves import Curves, sample
-from motionloom.io.gltf_nodes import Node, upwards
+from motionloom.io.gltf_nodes import OpenedGlb, upwards
 from motionloom.motion import Motion
 from motionloom.retarget.names import parts_by_name
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
+MAX_JOINTS = 10_000
 FAR = 1e6
 """Metres; nobody is further away."""
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
@@ -31,14 +32,16 @@ _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """A skeleton and the nodes that it stands for."""
+    """One person of a file: a skeleton and the nodes that it is made of."""
 
+    file: OpenedGlb
+    """Nodes above the person that are keyed and never move are where they are kept."""
     skeleton: Skeleton
     nodes: tuple[int, ...]
     """For each joint the number of its node."""
     turns: Array
     """(joints, 4) at rest: world_from_node."""
-    shifted: frozenset[int] = frozenset()
+    shifted: frozenset[int]
     """Joints whose nodes are not where the mesh was bound, on what they hang on."""
 
 
@@ -55,11 +58,7 @@ class Worlds:
 
 
 def worlds(
-    nodes: list[Node],
-    parents: list[int],
-    line: list[int],
-    sampled: Mapping[tuple[int, str], Array],
-    above: Worlds | None = None,
+    file: OpenedGlb, line: list[int], sampled: Mapping[tuple[int, str], Array], above: Worlds | None = None
 ) -> Worlds:
     """Forward kinematics of ``line``: nodes, parents first, from the top; ``sampled`` (frames, width) replaces rest.
 
@@ -67,7 +66,7 @@ def worlds(
     """
     found = Worlds({}, {}, {}) if above is None else above
     for n in line:
-        node, p = nodes[n], parents[n]
+        node, p = file.nodes[n], file.parents[n]
         place = sampled.get((n, "translation"), node.place[None])
         turn = sampled.get((n, "rotation"), node.turn[None])
         scale = sampled.get((n, "scale"), node.scale[None])
@@ -91,20 +90,22 @@ def worlds(
     return found
 
 
-def read_rig(
-    document: Document, nodes: list[Node], parents: list[int], *, joints: frozenset[int], tips: frozenset[int]
-) -> Rig:
-    """The skeleton of a person's ``joints``, of which ``tips`` are mere bone tips."""
+def read_rig(file: OpenedGlb, person: int, curves: Curves) -> Rig:
+    """The skeleton of a person whom these curves move; leaves that they do not turn are mere bone tips."""
+    file, joints = _without_still_armatures(file, person, curves)
+    nodes, parents = file.nodes, file.parents
+    turned = {node for node, path in curves if path == "rotation"}
+    still = not any(node in joints for node, _ in curves)
+    tips = {n for n in joints if not (still or n in turned or joints.intersection(nodes[n].children))}
     order = parents_first(joints, parents)
     above = upwards(parents[order[0]], parents)[::-1] if parents[order[0]] != -1 else []
     inner = {parents[n] for n in order}
-    _check_scales(document, nodes, [*above, *(n for n in order if n in inner)])  # of a last bone nothing else depends
-    rest = worlds(nodes, parents, [*above, *order], {})
+    _check_scales(file, [*above, *(n for n in order if n in inner)])  # of a last bone nothing else depends
+    rest = worlds(file, [*above, *order], {})
     names = dict(zip(order, unique_names([nodes[n].name for n in order])))
-    known = humanoid_nodes(document, len(nodes))
-    parts = _parts(order, parents, names, {n: rest.places[n][0] for n in order}, known)
+    parts = _parts(order, parents, names, {n: rest.places[n][0] for n in order}, file.humanoid)
     body = {n for part in parts.values() for n in upwards(part, parents)} or inner
-    turns, places, shifted = _bound(document, nodes, parents, order, rest, body=body)
+    turns, places, shifted = _bound(file, order, rest, body=body)
     hung = _hung(parents, parts)
     order = parents_first(joints, hung)
     slots = {n: k for k, n in enumerate(order)}
@@ -114,27 +115,25 @@ def read_rig(
         tuple(-1 if k == 0 else slots[hung[n]] for k, n in enumerate(order)),
         np.array(offsets),
         frozenset(slots[n] for n in tips if slots[n] > 0),
-        humanoid={part: names[n] for part, n in known.items() if n in names},
+        humanoid={part: names[n] for part, n in file.humanoid.items() if n in names},
         on_floor=on_floor(np.array([places[n][1] for n in order])),
     )
     moved = frozenset(slots[n] for n in shifted)
-    return Rig(skeleton, tuple(order), np.array([turns[n] for n in order]), moved)
+    return Rig(file, skeleton, tuple(order), np.array([turns[n] for n in order]), moved)
 
 
-def posed(
-    rig: Rig, document: Document, nodes: list[Node], parents: list[int], *, curves: Curves, fps: float, times: Array
-) -> Motion:
+def posed(rig: Rig, curves: Curves, *, fps: float, times: Array) -> Motion:
     """The rig moved by the curves, sampled at ``times`` (frames,) seconds."""
-    root = rig.nodes[0]
-    line = [*upwards(root, parents)[:0:-1], *parents_first(frozenset(rig.nodes), parents)]
+    parents = rig.file.parents
+    line = [*upwards(rig.nodes[0], parents)[:0:-1], *parents_first(frozenset(rig.nodes), parents)]
     sampled = {key: sample(curve, times, fps, turn=key[1] == "rotation") for key, curve in curves.items()}
-    moving = worlds(nodes, parents, line, sampled)
+    moving = worlds(rig.file, line, sampled)
     frames, joints = len(times), len(rig.nodes)
     world, places = np.empty((frames, joints, 4)), np.empty((frames, joints, 3))
     for k, n in enumerate(rig.nodes):
         world[:, k], places[:, k] = rot.multiply(moving.turns[n], rot.inverse(rig.turns[k])), moving.places[n]
     if not np.abs(places).max() < FAR:
-        raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
+        raise rig.file.document.bad(f"a joint is more than {FAR:g} m away; check the units")
     above = list(rig.skeleton.parents[1:])
     rotations, inside = world.copy(), places.copy()
     if above:
@@ -148,22 +147,44 @@ def posed(
 # --- rest ---------------------------------------------------------------------------------------------------------
 
 
-def _check_scales(document: Document, nodes: list[Node], line: list[int]) -> None:
+def _without_still_armatures(file: OpenedGlb, person: int, curves: Curves) -> tuple[OpenedGlb, frozenset[int]]:
+    """Let go of armature objects over the skeleton that are keyed but never move: they become fixed transforms."""
+    nodes, joints = list(file.nodes), set(file.people[person])
+    if len(joints) > MAX_JOINTS:
+        raise file.document.bad(f"its skeleton has {len(joints)} joints; at most {MAX_JOINTS} can be read")
+    kept = {j for skin in file.skins for j in skin} or file.people[person]
+    root = next(n for n in joints if file.parents[n] not in joints)
+    while root not in kept and len(inside := [c for c in nodes[root].children if c in joints]) == 1:
+        own = {path: curves[root, path].values for path in nodes[root].rest if (root, path) in curves}
+        if any(np.ptp(v, axis=0).max() >= 1e-6 * max(1.0, np.abs(v).max()) for v in own.values()):
+            break
+        nodes[root] = replace(
+            nodes[root],
+            place=own["translation"][0] if "translation" in own else nodes[root].place,
+            turn=rot.normalize(own["rotation"][0] if "rotation" in own else nodes[root].turn),
+            scale=own["scale"][0] if "scale" in own else nodes[root].scale,
+        )
+        joints.remove(root)
+        root = inside[0]
+    return replace(file, nodes=nodes), frozenset(joints)
+
+
+def _check_scales(file: OpenedGlb, line: list[int]) -> None:
     size = 1.0
     for number in line:
-        scale = nodes[number].scale
+        name, scale = file.nodes[number].name[:80], file.nodes[number].scale
         if not (scale > 1e-9).all() or np.ptp(scale) > 0.02 * scale.max():
-            raise document.bad(
-                f"node {number}, {nodes[number].name[:80]!r}, is scaled by {scale.tolist()}; only one positive scale "
+            raise file.document.bad(
+                f"node {number}, {name!r}, is scaled by {scale.tolist()}; only one positive scale "
                 "for all axes is read: apply scales in the program that made it (in Blender Object, Apply, Scale)"
             )
         size = max(size, float(scale.max())) if size > 1 else float(scale.max()) * size
         if not 1e-9 < size < 1e9:
-            raise document.bad("its scales are absurdly large or small")
+            raise file.document.bad("its scales are absurdly large or small")
 
 
 def _bound(
-    document: Document, nodes: list[Node], parents: list[int], order: list[int], rest: Worlds, *, body: set[int]
+    file: OpenedGlb, order: list[int], rest: Worlds, *, body: set[int]
 ) -> tuple[dict[int, Array], dict[int, Array], frozenset[int]]:
     """World turns (4,) and places (3,) as the mesh was bound, and the nodes that are elsewhere on what they hang on.
 
@@ -173,23 +194,26 @@ def _bound(
     turns = {n: rest.turns[n][0] for n in order}
     places = {n: rest.places[n][0] for n in order}
     shifted: set[int] = set()
-    bound = bind_pose(document, nodes, parents, list(rest.turns), set(order))
-    near = SAME_PLACE * float(np.ptp([m[:3, 3] for m in bound.values()], axis=0).max()) if bound else 0.0
-    known = {n: turn for n, m in bound.items() if (turn := turn_of(m)) is not None}
-    if any(angle(known[n], turns[n]) > SAME_TURN or np.linalg.norm(bound[n][:3, 3] - places[n]) > near for n in known):
-        turns[order[0]] = known.get(order[0], turns[order[0]])
+    bound = bind_pose(file, list(rest.turns), set(order))
+    near = SAME_PLACE * float(np.ptp([place for place, _ in bound.values()], axis=0).max()) if bound else 0.0
+    if any(
+        abs(float(turn @ turns[n])) < np.cos(SAME_TURN / 2) or np.linalg.norm(place - places[n]) > near
+        for n, (place, turn) in bound.items()
+    ):
         for n in order:
-            p = parents[n]
+            p, node = file.parents[n], file.nodes[n]
             if n != order[0]:
                 linear = rest.linear[p]
                 size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
-                places[n] = places[p] + rot.rotate(turns[p], nodes[n].place * size)
-                turns[n] = known.get(n, rot.multiply(turns[p], nodes[n].turn))
-            if n in known and n in body and np.linalg.norm(bound[n][:3, 3] - places[n]) > near:
-                places[n] = bound[n][:3, 3]
-                shifted.add(n)
+                places[n] = places[p] + rot.rotate(turns[p], node.place * size)
+                turns[n] = rot.multiply(turns[p], node.turn)
+            if n in bound:
+                place, turns[n] = bound[n]
+                if n in body and np.linalg.norm(place - places[n]) > near:
+                    places[n] = place
+                    shifted.add(n)
     if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
-        raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
+        raise file.document.bad(f"a joint is more than {FAR:g} m away; check the units")
     return turns, places, frozenset(shifted)
 
 

@@ -9,7 +9,7 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import characters
 from motionloom.io.bvh import read_bvh
 from motionloom.io.character import Character, load_character
-from motionloom.io.gltf_read import open_glb, without_still_armatures
+from motionloom.io.gltf_read import open_glb
 from motionloom.io.gltf_rig import read_rig
 from motionloom.io.text import parse_json
 from motionloom.retarget import joint_map
@@ -64,7 +64,7 @@ def loaded(path: Path, named: Named) -> tuple[Skeleton, Character | None]:
         return _knowing(skeleton, named), None
     character = load_character(path, joint_map=named or None)
     skeleton = _knowing(character.skeleton, named)
-    return skeleton, replace(character, rig=replace(character.rig, skeleton=skeleton))
+    return skeleton, replace(character, skeleton=skeleton)
 
 
 def question(skeleton: Skeleton) -> dict[str, Any]:
@@ -83,9 +83,7 @@ def question(skeleton: Skeleton) -> dict[str, Any]:
 def _skeleton(path: Path) -> Skeleton:
     if path.suffix == ".bvh":
         return read_bvh(path).motion.skeleton
-    file = open_glb(path)
-    nodes, joints, _ = without_still_armatures(file, 0, {})
-    return read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset()).skeleton
+    return read_rig(open_glb(path), 0, {}).skeleton
 
 
 def _knowing(skeleton: Skeleton, named: Named) -> Skeleton:
