@@ -42,7 +42,7 @@ def main() -> None:
             seeds = [seed, *(row_seed(seed, number) for number in range(1, COUNT))]
             asked = Rows([check.prompt] * COUNT, [frames] * COUNT, seeds)
             estimates = dict(sample(prior, asked, sampling, halfway=True))
-            mean = best._mean(prior, check.prompt, frames, seeds, sampling.levels(prior.schedule)[0])
+            mean = best._mean_estimate(prior, check.prompt, frames, seeds, sampling.levels(prior.schedule)[0])
             away = [best._distance(estimates[number], mean) for number in range(COUNT)]
             chosen = with_best_seeds(prior, Rows([check.prompt], [frames], [seed]), sampling).seeds[0]
             picked = [0, away.index(min(away)), seeds.index(chosen)]

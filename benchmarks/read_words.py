@@ -5,9 +5,9 @@ Usage: python benchmarks/read_words.py > benchmarks/read_words.txt
 
 import sys
 
-from motionloom.goals.amount_goal import kept, measured
+from motionloom.goals.amount_goal import is_met, measured
 from motionloom.tasks.text import generate
-from motionloom.tasks.worded import draw, read
+from motionloom.tasks.worded import generate_timelines, read
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 
@@ -46,12 +46,12 @@ def main() -> None:
         asked = read(prior, text)
         (reading,) = asked.readings
         amount = reading.amount
-        with_it = [next(iter(draw(prior, [asked], seeds=[seed]))) for seed in SEEDS]
+        with_it = [next(iter(generate_timelines(prior, [asked], seeds=[seed]))) for seed in SEEDS]
         without = [generate(prior, text, seed=seed, literal=True)[0] for seed in SEEDS]
         alone = [measured(amount, motion.positions(), motion.fps) for motion in without]
         lines = [
             ([one.amounts[0].measured for one in with_it], [one.amounts[0].kept for one in with_it]),
-            (alone, [kept(amount, size) for size in alone]),
+            (alone, [is_met(amount, size) for size in alone]),
         ]
         digits = 2 if amount.unit == "m" else 0
         cells = [

@@ -21,7 +21,7 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Timed
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 from tests.studio import started
@@ -50,8 +50,8 @@ def motion(prior: Prior, asked: dict[str, Any], folder: Path) -> str:
     """The id of a motion of the timeline, kept in a project's folder: its first four blocks, again and again."""
     whole = timeline_from(asked, folder=folder)
     some = len(whole.segments[:4])
-    part = concatenated(*compose(prior, whole.segments[:some], seed=3))
-    made = concatenated(*[part] * (len(whole.segments) // some))
+    part = concatenate(*compose(prior, whole.segments[:some], seed=3))
+    made = concatenate(*[part] * (len(whole.segments) // some))
     blocks = Timed(prior, whole.segments, None, Sampling(count=1, seed=3)).blocks
     assert len(made) == sum(block.frames for block in blocks)
     (folder / "motions").mkdir()

@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
-from motionloom.goals.remarks import looked_up
+from motionloom.goals.remarks import nearest_known
 from motionloom.goals.sequence import split_actions
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import EVERYDAY, in_words
@@ -52,7 +52,7 @@ def main() -> None:
     } | {f"{kind}, to {use}": listed for kind, uses in phrases.items() for use, listed in uses.items()}
     print("| sentences | called unknown |\n|---|---|")
     for name, prompts in asked.items():
-        found = looked_up(prompts, prior.known, prior.text) if prompts else []
+        found = nearest_known(prompts, prior.known, prior.text) if prompts else []
         if found:
             print(f"| {len(prompts)} {name} | {sum(not one.near for one in found) / len(found):.1%} |", flush=True)
 

@@ -206,7 +206,7 @@ def measure(case: Case, prior: Prior, out: Path, seeds: Sequence[int]) -> dict[s
         "seconds_of_motion": case.seconds,
         "seeds": list(seeds),
         "from": file.name if folder == EXAMPLES else "this script",
-        "asked": int(goal.asked.any(axis=-1).sum()),
+        "asked": int(goal.mask.any(axis=-1).sum()),
         "mean_cm": 100 * float(np.mean([one.error for one in made])),
         "worst_cm": 100 * max(one.worst for one in made),
         "drawn_cm": 100 * float(np.mean([off(one.sampled, goal) for one in made])),
@@ -224,7 +224,7 @@ def off(motion: Motion, goal: Any) -> float:
     """Metres from the asked places, mean."""
     from motionloom_lab.metrics.control import distances
 
-    return float(np.nanmean(distances(motion.positions(), goal.positions, goal.asked))) if goal.asked.any() else 0.0
+    return float(np.nanmean(distances(motion.positions(), goal.positions, goal.mask))) if goal.mask.any() else 0.0
 
 
 def line(found: Mapping[str, Any]) -> str:

@@ -20,7 +20,7 @@ path = root_path([(0, 0), (0.4, 1.0), (0.0, 2.0), (-0.4, 3.0)], frames=frames)
 # The left wrist up high in the frames 30 to 39. An array asks for what it likes; `read_goal` reads files and mappings.
 hand = Goal.nothing(frames)
 hand.positions[30:40, SMPL22.index("left_wrist"), 1] = 1.6
-hand.asked[30:40, SMPL22.index("left_wrist"), 1] = True
+hand.mask[30:40, SMPL22.index("left_wrist"), 1] = True
 crouched = {"joints": [{"joint": "head", "points": [{"time": 2.9, "position": [None, 1.35, None]}]}]}
 low = read_goal(crouched, frames=frames, folder=Path())
 

@@ -16,7 +16,7 @@ clip = to_smpl22(load(Path(__file__).parent / "clips" / "walk.bvh")).resample(20
 wrist = SMPL22.index("left_wrist")
 goal = Goal.nothing(60)
 goal.positions[30, wrist, 1] = 1.5
-goal.asked[30, wrist, 1] = True
+goal.mask[30, wrist, 1] = True
 segments = [Segment("a person walks forward", 3.0, goal=goal), Segment("a person turns around", 3.0)]
 
 made = joined(list(compose(Prior.load(), segments, start=clip, seed=1, steps=8)))

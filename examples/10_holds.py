@@ -32,7 +32,7 @@ legs[..., layout.mask("lower_body")] = True
 wrist = SMPL22.index("left_wrist")
 goal = Goal.nothing(known.shape[1])
 goal.positions[30, wrist, 1] = 1.6
-goal.asked[30, wrist, 1] = True
+goal.mask[30, wrist, 1] = True
 
 noise, way = row_noise([1]), levels(prior.schedule, 12, spacing="early")
 cond = prior.condition(["a person walks and raises the left hand"])

@@ -285,7 +285,7 @@ UNCLEAR = {
     *("stands", "taken", "told", "wanted", "wish"),
 }
 """Names of functions that do not say what they return: a value is a noun, a function a verb."""
-CLEAR_ROOMS = ("bulk", "cli", "io", "robots", "server", "viz")
+CLEAR_ROOMS = ("bulk", "cli", "goals", "io", "requests", "robots", "server", "tasks", "viz")
 """Rooms of the product in which no function has such a name; of the other packages no room has one."""
 
 

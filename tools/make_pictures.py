@@ -109,7 +109,7 @@ def control(prompt: str, goal: Path, seconds: float, work: Path) -> Motion:
 def strobe(motion: Motion, camera: draw.Camera, frames: Sequence[int], *, asked: Goal, to: Path) -> Path:
     """One picture of a motion in several frames on its way along the floor: asked in yellow, made on top of it."""
     shape = figure(motion)
-    wanted = asked.asked[:, 0].any(axis=-1)
+    wanted = asked.mask[:, 0].any(axis=-1)
     picture = Image.new("RGB", (camera.size[0] * draw.SMOOTH, camera.size[1] * draw.SMOOTH), draw.PAPER)
     pen = ImageDraw.Draw(picture)
     draw.paint_floor(pen, camera, shape.floor)

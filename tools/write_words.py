@@ -16,7 +16,7 @@ PATTERNS = {
     "steps": amounts._STEPS,
     "seconds": amounts._SECONDS,
     "often": amounts._OFTEN,
-    "often_kept": amounts._OFTEN_KEPT,
+    "often_kept": amounts._OFTEN_OF_LIMBS,
     "many": amounts._MANY,
     "ages": amounts._AGES,
     "body": amounts._BODY,

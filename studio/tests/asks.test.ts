@@ -1,9 +1,17 @@
 import { describe, expect, it } from "vitest";
-import { changeTarget, keepWay, needsWay, putPose, putTarget, setPath, shiftTarget } from "../src/project/asks";
+import {
+  changeTarget,
+  pathFromMotion,
+  personWithoutPath,
+  setPose,
+  setTarget,
+  setPath,
+  shiftTarget,
+} from "../src/project/constraints";
 import { motionClip } from "../src/body/clip";
 import { pathPoint } from "../src/project/path";
 import { type Project, type Vec3, exampleProject, keptTake, segment } from "../src/project/model";
-import { STANDS, type SegmentJson, goalOf, timelineOf } from "../src/project/goals";
+import { STANDS_STILL, type SegmentJson, goalOf, timelineOf } from "../src/project/goals";
 import { plan, planKey, stale } from "../src/project/plan";
 import { freeze, freezeRest, setPeople, write } from "../src/project/timeline";
 import type { ComposeRequest } from "../src/server/types";
@@ -17,12 +25,12 @@ function asking(edit: (project: Project) => Project): Project {
 
 describe("targets", () => {
   it("of one joint at one time are one, which moves", () => {
-    const project = asking((old) => putTarget(putTarget(old, 0, 21, 1, [0, 1, 0]), 0, 21, 1.02, [0, 1.5, 0]));
+    const project = asking((old) => setTarget(setTarget(old, 0, 21, 1, [0, 1, 0]), 0, 21, 1.02, [0, 1.5, 0]));
     expect(project.people[0]!.targets.map((one) => one.position)).toEqual([[0, 1.5, 0]]);
   });
 
   it("are the points of a goal file, in the order of time", () => {
-    const project = asking((old) => putTarget(putTarget(old, 0, 21, 3, [0, 1, 0]), 0, 21, 1, [0.1234567, 1, 0]));
+    const project = asking((old) => setTarget(setTarget(old, 0, 21, 3, [0, 1, 0]), 0, 21, 1, [0.1234567, 1, 0]));
     expect(goalOf(project.people[0]!, 6.5)).toEqual({
       joints: [
         {
@@ -37,17 +45,17 @@ describe("targets", () => {
   });
 
   it("of one block are seen from where it begins, of several they keep the way as it is", () => {
-    const several = asking((old) => putTarget(old, 0, 21, 1, [0, 1, 0]));
+    const several = asking((old) => setTarget(old, 0, 21, 1, [0, 1, 0]));
     const one = { ...several, segments: several.segments.slice(0, 1) };
     expect(timelineOf(one).path).toBeUndefined();
     expect(timelineOf(one).segments[0]!.goal!.joints).toHaveLength(1);
-    expect(needsWay(several)).toBe(0);
+    expect(personWithoutPath(several)).toBe(0);
     expect(plan(several).missing).toMatchObject({ at: { kind: "path", who: 0 } });
     const walking = Float32Array.from({ length: 130 * 66 }, (_, n) =>
       n % 66 === 2 ? Math.floor(n / 66) / 20 : n % 66 === 3 ? 1 : 0,
     );
-    const kept = keepWay(several, 0, motionClip(20, [walking]));
-    expect(needsWay(kept)).toBe(-1);
+    const kept = pathFromMotion(several, 0, motionClip(20, [walking]));
+    expect(personWithoutPath(kept)).toBe(-1);
     const { path } = timelineOf(kept).path!;
     expect(path!.points.at(-1)![1]).toBeCloseTo(6.45, 1);
     expect(path!.times.at(-1)).toBe(6.5);
@@ -55,7 +63,7 @@ describe("targets", () => {
   });
 
   it("that are pinned ask for every frame between", () => {
-    let project = asking((old) => putTarget(old, 0, 20, 1, [0, 1, 0], "t"));
+    let project = asking((old) => setTarget(old, 0, 20, 1, [0, 1, 0], "t"));
     project = changeTarget(project, 0, "t", { until: 2 });
     const position = [0, 1, 0];
     expect(goalOf(project.people[0]!, 6.5)!.joints).toEqual([
@@ -72,7 +80,7 @@ describe("targets", () => {
   });
 
   it("go before a pose at the same time", () => {
-    const project = asking((old) => putTarget(putPose(old, 0, "pose", 2, STANDING), 0, 21, 2, [1, 1, 1]));
+    const project = asking((old) => setTarget(setPose(old, 0, "pose", 2, STANDING), 0, 21, 2, [1, 1, 1]));
     const joints = goalOf(project.people[0]!, 6.5)!.joints!;
     expect(joints).toHaveLength(22);
     expect(joints.find((one) => one.joint === "right_wrist")!.points).toEqual([{ time: 2, position: [1, 1, 1] }]);
@@ -93,7 +101,7 @@ describe("what is drawn", () => {
     const project = { ...exampleProject(), segments: [segment("walk", 2), segment(" ", 2)] };
     const [job] = plan(project).jobs as ComposeRequest[];
     const { segments } = job!.timeline as { segments: SegmentJson[] };
-    expect(segments.map((one) => one.text)).toEqual(["walk", STANDS]);
+    expect(segments.map((one) => one.text)).toEqual(["walk", STANDS_STILL]);
     const empty = { ...project, segments: [segment(" ", 2), segment("", 2)] };
     const at = { kind: "segment", id: empty.segments[0]!.id };
     const message = "No block has words yet; say what the person does.";

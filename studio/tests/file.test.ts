@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { putTarget } from "../src/project/asks";
+import { setTarget } from "../src/project/constraints";
 import { ProjectError, read, stampOf, written } from "../src/project/file";
 import { exampleProject } from "../src/project/model";
 import { halfSeconds, snap } from "../src/project/snap";
@@ -9,7 +9,7 @@ import { events } from "../src/server/events";
 describe("a project file", () => {
   it("gives back what was written", () => {
     const project = {
-      ...putTarget(exampleProject(), 0, 5, 1, [1, 2, 3]),
+      ...setTarget(exampleProject(), 0, 5, 1, [1, 2, 3]),
       frozen: [[0, 1]] as const,
       name: "Ångström 走",
     };

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { putPose, putTarget, setPath } from "../src/project/asks";
+import { setPose, setTarget, setPath } from "../src/project/constraints";
 import { checked } from "../src/project/file";
 import { type TimelineJson, timelineOf } from "../src/project/goals";
 import { type Project, type Vec3, exampleProject } from "../src/project/model";
@@ -32,9 +32,9 @@ describe("a timeline of the page", () => {
   it("comes in whole and goes out the same: path, targets, a pin, a pose", () => {
     const project = asking(
       (old) => setPath(old, 0, PATH),
-      (old) => putTarget(old, 0, 21, 1, [0.3, 1.5, 1]),
-      (old) => putTarget(old, 0, 20, 3, [0.3, 1, 2]),
-      (old) => putPose(old, 0, "pose", 2, STANDING),
+      (old) => setTarget(old, 0, 21, 1, [0.3, 1.5, 1]),
+      (old) => setTarget(old, 0, 20, 3, [0.3, 1, 2]),
+      (old) => setPose(old, 0, "pose", 2, STANDING),
     );
     const pinned = { ...project.people[0]!.targets[1]!, until: 3.5 };
     const whole = {
@@ -55,7 +55,7 @@ describe("a timeline of the page", () => {
   it("of one block keeps its targets without a path", () => {
     const project = asking(
       (old) => ({ ...old, segments: old.segments.slice(0, 1) }),
-      (old) => putTarget(old, 0, 21, 1, [0.3, 1.5, 1]),
+      (old) => setTarget(old, 0, 21, 1, [0.3, 1.5, 1]),
     );
     const timeline = timelineOf(project);
     expect(timeline.segments[0]!.goal).toBeDefined();
@@ -122,7 +122,7 @@ describe("a timeline of somebody else", () => {
 describe("a sentence of the server", () => {
   const project = asking(
     (old) => setPath(old, 0, PATH),
-    (old) => putTarget(old, 0, 21, 1, [0.3, 3.5, 1]),
+    (old) => setTarget(old, 0, 21, 1, [0.3, 3.5, 1]),
   );
   const [target] = project.people[0]!.targets;
   const high = "the timeline, path: path: the goal asks for right_wrist at 1.00 s 3.50 m high; keep it below 3 m";

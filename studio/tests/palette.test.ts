@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { type Action } from "../src/app/actions";
-import { found } from "../src/panels/palette";
+import { matchingActions } from "../src/panels/palette";
 import { addMarker, changeMarker, nextStop, removeMarker } from "../src/project/markers";
 import { exampleProject } from "../src/project/model";
 import { GHOSTS } from "../src/stage/theme";
@@ -13,7 +13,7 @@ const action = (label: string, note = ""): Action => ({
   run: () => undefined,
 });
 const ALL = [action("Undo"), action("Export BVH", "Motion on the 22 joints"), action("Open files"), action("Loop")];
-const names = (letters: string) => found(ALL, letters).map((one) => one.label);
+const names = (letters: string) => matchingActions(ALL, letters).map((one) => one.label);
 
 describe("the palette", () => {
   it("has everything without letters, and by beginnings of words first", () => {

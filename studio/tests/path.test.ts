@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { drawPath } from "../src/project/asks";
+import { drawPath } from "../src/project/constraints";
 import { exampleProject } from "../src/project/model";
 import { curve, direction, facings, pathPoint, placeAt, simplified, timed } from "../src/project/path";
 

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { between, mirrored, moved, turnedTo } from "../src/body/posed";
 import { LEFT, PARENTS, PELVIS, RIGHT } from "../src/body/skeleton";
-import { fillPoses, putPose } from "../src/project/asks";
+import { fillPoses, setPose } from "../src/project/constraints";
 import { type Vec3, exampleProject } from "../src/project/model";
 
 /** Somebody in a step of a walk. */
@@ -70,7 +70,7 @@ describe("a pose", () => {
   it("has others evenly between it and the next, with bones as long", () => {
     const [half] = between(REST, raised, 1);
     close(bones(half!), bones(REST));
-    const keyed = putPose(putPose(exampleProject(), 0, "a", 1, REST), 0, "b", 3, raised);
+    const keyed = setPose(setPose(exampleProject(), 0, "a", 1, REST), 0, "b", 3, raised);
     const { poses } = fillPoses(keyed, 0, keyed.people[0]!.poses[0]!.id, 3).people[0]!;
     expect(poses.map((one) => one.time).sort()).toEqual([1, 1.5, 2, 2.5, 3]);
     close(poses.find((one) => one.time === 2)!.positions.flat(), half!.flat());

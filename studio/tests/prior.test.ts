@@ -10,7 +10,7 @@ import { type Body, placesOf } from "../src/prior/person";
 import { startOf } from "../src/prior/path";
 import { Prior, finished, flat, literal, sketched } from "../src/prior/prior";
 import { supported } from "../src/prior/stairs";
-import { type Part, measured, partsOf, reading } from "../src/prior/wanted";
+import { type Part, measured, partsOf, reading } from "../src/prior/amounts";
 import { type Manifest, Packed } from "../src/prior/weights";
 
 const FOLDER = process.env.MOTIONLOOM_TAB ?? "";

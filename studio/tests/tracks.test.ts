@@ -2,9 +2,9 @@ import { describe, expect, it } from "vitest";
 import { read, written } from "../src/project/file";
 import { type Project, type Take, exampleProject } from "../src/project/model";
 import { plan } from "../src/project/plan";
-import { settled } from "../src/project/settled";
+import { withFixedTake } from "../src/project/fixedTake";
 import { freeze, setPeople } from "../src/project/timeline";
-import { PARTS, addTrack, changeTrack, shiftTrack, trackCommands, trackKeys, trackSaid } from "../src/project/tracks";
+import { PARTS, addTrack, changeTrack, shiftTrack, trackCommands, trackKeys, trackText } from "../src/project/tracks";
 
 const TAKE: Take = { motion: "old", seed: 1, seconds: 6.5, people: 1, how: "drawn" };
 
@@ -38,8 +38,8 @@ describe("a part with words of its own", () => {
       plan(one).jobs.flatMap((job) => (job.task === "edit" && job.keep ? [job.between] : []));
     expect(spans(freeze(drawn, [0, 3]))).toEqual([[[3, 5]]]);
     expect(spans(freeze({ ...drawn, takes: [TAKE] }, [0, 3]))).toEqual([[[1, 5]]]);
-    expect(plan(settled(project, TAKE)).jobs).toEqual([]);
-    const newer = plan({ ...waving(1, 5, settled(exampleProject(), TAKE)), count: 4 }).jobs;
+    expect(plan(withFixedTake(project, TAKE)).jobs).toEqual([]);
+    const newer = plan({ ...waving(1, 5, withFixedTake(exampleProject(), TAKE)), count: 4 }).jobs;
     expect(newer).toMatchObject([{ motion: "old", between: [[1, 5]], count: 4 }]);
   });
 
@@ -64,10 +64,10 @@ describe("a part with words of its own", () => {
   it("of the head says in words what it does, or looks somewhere", () => {
     const nods = changeTrack(addTrack(exampleProject(), 0, [1, 3], "t"), 0, "t", { part: "head", text: "nods twice" });
     expect(plan(nods).jobs[1]).toMatchObject({ prompt: "nods twice", keep: PARTS.head.keep, between: [[1, 3]] });
-    expect(trackSaid(nods.people[0]!.tracks[0]!)).toBe("nods twice");
+    expect(trackText(nods.people[0]!.tracks[0]!)).toBe("nods twice");
     const looks = changeTrack(nods, 0, "t", { look: [1, 1.5, 2] });
     expect(plan(looks).jobs[1]).not.toHaveProperty("prompt");
-    expect(trackSaid(looks.people[0]!.tracks[0]!)).toBe("looks at a point");
+    expect(trackText(looks.people[0]!.tracks[0]!)).toBe("looks at a point");
     expect(trackCommands(nods, "a")[0]).toContain("edit a.npz 'nods twice' --keep lower_body --keep torso");
   });
 

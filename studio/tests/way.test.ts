@@ -1,7 +1,7 @@
 /** Paths on the ground; `prior.test.ts` compares what is made of them with Python. */
 
 import { expect, test } from "vitest";
-import { solved } from "../src/prior/dense";
+import { solveSystem } from "../src/prior/dense";
 import { type Place, even, seenFrom, startOf, wayThrough } from "../src/prior/path";
 import { stilled } from "../src/prior/stances";
 import type { Vec } from "../src/prior/turns";
@@ -56,7 +56,7 @@ test("a way is seen from its beginning as from the origin", () => {
 
 test("a positive system is solved for several columns", () => {
   const a = Float64Array.of(4, 2, 2, 3);
-  const x = solved(a, Float64Array.of(8, 2, 7, 1), 2, 2);
+  const x = solveSystem(a, Float64Array.of(8, 2, 7, 1), 2, 2);
   expect([...x].map((one) => Math.round(one * 1e9) / 1e9)).toEqual([1.25, 0.5, 1.5, 0]);
 });
 

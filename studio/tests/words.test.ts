@@ -2,9 +2,9 @@
 
 import { readFileSync } from "node:fs";
 import { describe, expect, test } from "vitest";
-import { partsOf, reading } from "../src/prior/wanted";
+import { partsOf, reading } from "../src/prior/amounts";
 import { described, isSeveral } from "../src/prior/words";
-import { readings, secondsSaid } from "../src/tab/numbers";
+import { readings, secondsInText } from "../src/tab/numbers";
 
 const FILE = process.env.MOTIONLOOM_WORDS ?? "";
 
@@ -71,5 +71,5 @@ test("the page says what it keeps of numbers, and what it leaves to the network"
   expect(said("walks 3 meters, then sits down").left.join()).toContain('"3 meters"');
   expect(said("take three steps forward and stop").kept).toEqual(["3 steps forward, 4 s"]);
   expect(said("a man of 25 walks a dog")).toEqual({ kept: [], left: [] });
-  expect([secondsSaid("waves for a minute"), secondsSaid("waves")]).toEqual([10, null]);
+  expect([secondsInText("waves for a minute"), secondsInText("waves")]).toEqual([10, null]);
 });

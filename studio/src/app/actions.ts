@@ -1,6 +1,6 @@
 /** Everything that can be done, with its words and its keys: what buttons, menus, keys, the palette and `?` share. */
 
-import { removePoint, removePose, removeTarget } from "../project/asks";
+import { removePoint, removePose, removeTarget } from "../project/constraints";
 import { addMarker, nextStop, removeMarker } from "../project/markers";
 import { FPS, begins, clamp, round, toFrame } from "../project/model";
 import {
@@ -16,7 +16,7 @@ import { newLook, newSmoothing, newTrack, writeTrack } from "../panels/tracks";
 import { removeTrack } from "../project/tracks";
 import type { Stage } from "../stage/stage";
 import { type App, duration } from "./app";
-import { type Clipboard, copied, kept } from "./clipboard";
+import { type Clipboard, copied, readClipboard } from "./clipboard";
 import type { Deeds } from "./deeds";
 import type { Drawer } from "./drawing";
 import type { Files } from "./files";
@@ -209,9 +209,9 @@ function blocks({ app, editWords }: Parts): Actions {
       group,
       label: "Paste blocks behind the selected one",
       keys: ["Ctrl+V"],
-      isThere: () => kept().length > 0,
+      isThere: () => readClipboard().length > 0,
       run: () => {
-        const found = kept();
+        const found = readClipboard();
         if (found.length) paste(found, behind(), "paste blocks");
       },
     },
@@ -412,7 +412,7 @@ export function nudged(event: KeyboardEvent, { app, stage }: Parts): boolean {
     PageDown: [0, -size, 0],
   };
   const way = ways[event.key]?.map(round) as [number, number, number] | undefined;
-  if (tool === "path" && event.key === "Enter") stage.path.put();
+  if (tool === "path" && event.key === "Enter") stage.path.placePoint();
   else if (!way) return false;
   else if (tool === "path") stage.path.nudge(way[0], way[2]);
   else if (tool === "meeting") stage.meetings.nudge(...way);

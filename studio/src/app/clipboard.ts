@@ -19,7 +19,7 @@ export function copied(blocks: Clipboard): void {
 }
 
 /** What was copied last, here or in another tab. */
-export function kept(): Clipboard {
+export function readClipboard(): Clipboard {
   try {
     const segments: unknown = JSON.parse(localStorage.getItem(KEY) ?? "[]");
     return Array.isArray(segments) && segments.length ? checked({ ...exampleProject(), segments }).segments : here;

@@ -2,7 +2,7 @@
 
 import { mirrored, turnedTo } from "../body/posed";
 import { POSE, facingAt, jointAt, places, poseAt } from "../body/clip";
-import { changePose, fillPoses, movedTo, neighbours, poseNear, putPose } from "../project/asks";
+import { changePose, fillPoses, moveTo, neighbours, poseNear, setPose } from "../project/constraints";
 import {
   type Clip,
   type Project,
@@ -16,8 +16,8 @@ import {
   segment,
   toFrame,
 } from "../project/model";
-import { isDrawn } from "../project/plan";
-import { continued, pieces, settled, withMotion } from "../project/settled";
+import { isUpToDate } from "../project/plan";
+import { withContinuedTake, blocksOfClip, withFixedTake, withMotion } from "../project/fixedTake";
 import { freeze, freezeRest, unfrozen, write } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
 import { type App, fail, shownClip } from "./app";
@@ -37,7 +37,7 @@ export class Deeds {
   /** Change the words of a block while they are typed. */
   write(id: string, text: string, second: boolean): void {
     const options = { merge: `text:${id}${second}`, typed: true };
-    this.app.project.change("write", (old) => write(old, id, text, second, isDrawn(old)), options);
+    this.app.project.change("write", (old) => write(old, id, text, second, isUpToDate(old)), options);
   }
 
   /** Keep what is marked, or the block that is selected, as it is; of a draw that is on its way, what comes of it. */
@@ -97,7 +97,7 @@ export class Deeds {
       people: clip.people.length,
       how: "continued",
     };
-    this.app.project.change(`go on with future ${index + 1}`, (old) => continued(old, take));
+    this.app.project.change(`go on with future ${index + 1}`, (old) => withContinuedTake(old, take));
   }
 
   /** Make the end of the take go over into its beginning. */
@@ -141,7 +141,7 @@ export class Deeds {
   putOnTimeline(clip: Clip): void {
     const take: Take = { motion: clip.motion, seed: 0, seconds: clip.seconds, people: 1, how: "from a file" };
     this.app.session.update({ time: 0, selection: NOTHING, fan: null });
-    this.app.project.change(`open ${clip.name}`, (old) => withMotion(old, take, pieces(clip.name, clip.seconds)));
+    this.app.project.change(`open ${clip.name}`, (old) => withMotion(old, take, blocksOfClip(clip.name, clip.seconds)));
   }
 
   /** Put the kept take aside, among the clips. */
@@ -224,7 +224,7 @@ export class Deeds {
   private putPose(name: string, positions: readonly Vec3[], label: string): void {
     const { person } = this.app.session.value;
     const time = clamp(toFrame(this.app.session.value.time), 0, length(this.app.project.value));
-    this.app.project.change(label, (old) => putPose(old, person, name, time, positions));
+    this.app.project.change(label, (old) => setPose(old, person, name, time, positions));
     const put = poseNear(this.app.project.value, person, time);
     if (put) this.app.session.update({ selection: { kind: "pose", id: put.id }, time: put.time, playing: false });
   }
@@ -236,7 +236,7 @@ export class Deeds {
     const positions = places(poseAt(other, 0, at, new Float32Array(POSE)));
     const shown = shownClip(this.app);
     const [x, , z] = shown ? jointAt(shown, person, 0, time) : [0, 0, 0];
-    this.putPose(clip.name, movedTo(positions, { x, z }), "keyframe a pose");
+    this.putPose(clip.name, moveTo(positions, { x, z }), "keyframe a pose");
   }
 
   /** What was done live becomes the motion; each stretch of the same words is a block. */
@@ -253,7 +253,7 @@ export class Deeds {
   }
 
   private take(result: Result, how: string, label: string): void {
-    this.app.project.change(label, (old) => settled(old, takeOf(result, how)));
+    this.app.project.change(label, (old) => withFixedTake(old, takeOf(result, how)));
   }
 
   private put(result: Result, label: string, segments: Project["segments"], how: string): void {

@@ -1,9 +1,9 @@
 /** Draws again on its own: whatever changes what is asked makes a new motion, which is shown as it takes shape. */
 
-import { keepWay, needsWay } from "../project/asks";
+import { pathFromMotion, personWithoutPath } from "../project/constraints";
 import { overlaid } from "../body/clip";
 import { CHANGED, FPS, type Project, keptTake, length } from "../project/model";
-import { type Job, type Plan, isDrawn, plan, planKey } from "../project/plan";
+import { type Job, type Plan, isUpToDate, plan, planKey } from "../project/plan";
 import { trackKeys } from "../project/tracks";
 import { type Result, motion, takeOf } from "../server/api";
 import type { JobRequest } from "../server/types";
@@ -81,8 +81,8 @@ export class Drawer {
   /** Joints that are asked over several blocks need a path: the way as it is. */
   private keepWays(): void {
     const clip = shownClip(this.app);
-    const who = needsWay(this.app.project.value);
-    if (clip && who >= 0 && who < clip.people.length) this.app.project.amend((old) => keepWay(old, who, clip));
+    const who = personWithoutPath(this.app.project.value);
+    if (clip && who >= 0 && who < clip.people.length) this.app.project.amend((old) => pathFromMotion(old, who, clip));
   }
 
   /** Draw all blocks, also those that would be kept: what the timeline's file makes. */
@@ -107,7 +107,7 @@ export class Drawer {
   /** Give up a draw that another page has done, or whose words are no more; what was asked beside the timeline goes on. */
   private yield(): void {
     const { value } = this.app.project;
-    if (this.key && (isDrawn(value) || planKey(value) !== this.key)) this.stop();
+    if (this.key && (isUpToDate(value) || planKey(value) !== this.key)) this.stop();
   }
 
   /** Until nothing is being drawn any more, nor about to be: what is done with the take then is done with the new one. */

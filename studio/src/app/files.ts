@@ -1,7 +1,7 @@
 /** Files that are dropped or chosen, and files that are written. */
 
 import { SUFFIX, checked, read, written } from "../project/file";
-import { asked, timelineOf } from "../project/goals";
+import { constraintCount, timelineOf } from "../project/goals";
 import { CHANGED, type Project, type Stamp, keptTake } from "../project/model";
 import { trackCommands } from "../project/tracks";
 import { opened } from "../project/opened";
@@ -48,7 +48,7 @@ export class Files {
   async open(files: readonly File[]): Promise<void> {
     // A skeleton goes before the motions that need it.
     for (const file of [...files].sort((a, b) => Number(isAsf(b)) - Number(isAsf(a)))) {
-      await this.said(file.name, () => this.openOne(file));
+      await this.report(file.name, () => this.openOne(file));
     }
   }
 
@@ -56,7 +56,7 @@ export class Files {
   async export(choice: Format | "yaml" | "project" | "share"): Promise<void> {
     const { value } = this.app.project;
     const name = fileName(value.name);
-    await this.said("Export", async () => {
+    await this.report("Export", async () => {
       if (choice === "project") return saveFile(value, this.app.session.value.stamp);
       if (choice === "yaml") return this.exportYaml(value, name);
       const take = keptTake(value);
@@ -145,7 +145,7 @@ export class Files {
     await this.projects.add(checked(opened(found, file.name.replace(/\.ya?ml$/i, ""), second ? 1 : 0)));
   }
 
-  private async said(what: string, deed: () => Promise<void>): Promise<void> {
+  private async report(what: string, deed: () => Promise<void>): Promise<void> {
     try {
       this.app.session.update({ error: null });
       await deed();
@@ -158,7 +158,7 @@ export class Files {
 /** What makes the same motion of a timeline file. */
 function command(project: Project, file: string): string {
   if (project.people.length === 1) return `compose ${file}`;
-  return `duet --timeline ${file} --person ${asked(project) + 1}`;
+  return `duet --timeline ${file} --person ${constraintCount(project) + 1}`;
 }
 
 function isAsf(file: File): boolean {

@@ -1,7 +1,7 @@
 /** What this browser keeps of each project's history, so that undo goes on behind a reload. */
 
 import { checked } from "../project/file";
-import type { Entry, History, Kept } from "../project/history";
+import type { Entry, History, StoredHistory } from "../project/history";
 import type { Project } from "../project/model";
 
 const NAME = "motionloom-studio";
@@ -12,15 +12,15 @@ const PROJECTS = 12;
 /** Milliseconds of quiet until what was done is kept. */
 const QUIET = 100;
 
-interface Stored extends Kept<Project> {
+interface Stored extends StoredHistory<Project> {
   readonly present: Project;
   readonly at: number;
 }
 
-export const EMPTY: Kept<Project> = { past: [], future: [] };
+export const EMPTY: StoredHistory<Project> = { past: [], future: [] };
 
 /** What was kept of a project whose state is `project` now: undo goes back over what others did meanwhile, too. */
-export async function remembered(id: string, project: Project): Promise<Kept<Project>> {
+export async function remembered(id: string, project: Project): Promise<StoredHistory<Project>> {
   try {
     const found = (await done((await opened()).transaction(STORE).objectStore(STORE).get(id))) as Stored | undefined;
     if (!found) return EMPTY;

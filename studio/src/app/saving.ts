@@ -9,7 +9,7 @@
 import { ProjectError, checked, filed, stampOf } from "../project/file";
 import { type Project, type Stamp, exampleProject, newId } from "../project/model";
 import type { Problem } from "../project/places";
-import type { Kept as KeptHistory } from "../project/history";
+import type { StoredHistory as KeptHistory } from "../project/history";
 import { isUp, openProject, putAside, saveProject, savedProject, savedStamp } from "../server/api";
 import { CLIENT, Refused, Unreachable } from "../server/http";
 import { type App, fail } from "./app";
@@ -42,7 +42,7 @@ export interface Start {
 }
 
 /** What this browser keeps of a project. */
-interface Kept {
+interface EarlySave {
   readonly project: Project;
   readonly stamp: Stamp;
   readonly pending: boolean;
@@ -61,22 +61,22 @@ export async function restored(): Promise<Start> {
   } catch (error) {
     if (error instanceof Refused && error.status === UNREADABLE)
       return setAside("The project in the folder cannot be read: it is not JSON.");
-    const last = error instanceof Unreachable ? kept(localStorage.getItem(`${KEY}:last`)) : null;
-    return last ? { ...PLAIN, ...last, connected: false } : begun();
+    const last = error instanceof Unreachable ? earlySave(localStorage.getItem(`${KEY}:last`)) : null;
+    return last ? { ...PLAIN, ...last, connected: false } : freshStart();
   }
   const early = keptByEarlier();
-  if (found === null) return unsaved(early) ?? begun();
+  if (found === null) return unsaved(early) ?? freshStart();
   try {
     const project = checked(found);
     const stamp = stampOf(found) ?? { id: newId(), revision: 0 };
-    return withKept(project, stamp, found as Record<string, unknown>, early);
+    return withEarlySave(project, stamp, found as Record<string, unknown>, early);
   } catch (error) {
     if (error instanceof ProjectError) return setAside(error.message);
     throw error;
   }
 }
 
-function begun(told: string | null = null): Start {
+function freshStart(told: string | null = null): Start {
   return { ...PLAIN, project: exampleProject(), stamp: { id: newId(), revision: 0 }, isNew: true, told };
 }
 
@@ -84,21 +84,21 @@ function begun(told: string | null = null): Start {
 async function setAside(why: string): Promise<Start> {
   try {
     const name = await putAside();
-    return begun(`${why} It stays in the project folder as ${name}, and this is a new one.`);
+    return freshStart(`${why} It stays in the project folder as ${name}, and this is a new one.`);
   } catch (error) {
-    return begun(`${why} ${(error as Error).message}`);
+    return freshStart(`${why} ${(error as Error).message}`);
   }
 }
 
 /** Changes that no server ever had may be another folder's: somebody says where they belong. */
-function unsaved(early: Kept | null): Start | null {
-  const here = early ?? kept(localStorage.getItem(`${KEY}:last`));
+function unsaved(early: EarlySave | null): Start | null {
+  const here = early ?? earlySave(localStorage.getItem(`${KEY}:last`));
   if (!here?.pending || !here.edited || here.stamp.revision > 0) return null;
   return { ...PLAIN, ...here, conflict: { stamp: null, project: null } };
 }
 
-function withKept(project: Project, stamp: Stamp, found: Record<string, unknown>, early: Kept | null): Start {
-  const here = early ?? kept(stamp.id);
+function withEarlySave(project: Project, stamp: Stamp, found: Record<string, unknown>, early: EarlySave | null): Start {
+  const here = early ?? earlySave(stamp.id);
   if (!here?.pending || same(here.project, project)) return { ...PLAIN, project, stamp };
   const { by, from } = (found.written ?? {}) as { by?: unknown; from?: unknown };
   const isOwn = by === here.client && here.stamp.revision >= Number(from);
@@ -112,9 +112,9 @@ function same(one: Project, other: Project): boolean {
   return JSON.stringify(one) === JSON.stringify(other);
 }
 
-function kept(id: string | null): Kept | null {
+function earlySave(id: string | null): EarlySave | null {
   try {
-    const found = JSON.parse(localStorage.getItem(`${KEY}:${id}`) ?? "null") as Kept | null;
+    const found = JSON.parse(localStorage.getItem(`${KEY}:${id}`) ?? "null") as EarlySave | null;
     const stamp = stampOf(found?.project);
     return found && stamp && { ...found, project: checked(found.project), stamp };
   } catch {
@@ -123,7 +123,7 @@ function kept(id: string | null): Kept | null {
 }
 
 /** What a page kept that knew no ids: of which project that was, nobody knows. */
-function keptByEarlier(): Kept | null {
+function keptByEarlier(): EarlySave | null {
   try {
     const found = JSON.parse(localStorage.getItem(KEY) ?? "null") as { project: unknown; pending: boolean } | null;
     localStorage.removeItem(KEY);
@@ -360,7 +360,7 @@ export class Saver {
     const names = Array.from({ length: localStorage.length }, (_, index) => localStorage.key(index)!);
     for (const name of names.filter((one) => one.startsWith(`${KEY}:`))) {
       const other = name.slice(KEY.length + 1);
-      if (other !== "last" && other !== id && !kept(other)?.pending) localStorage.removeItem(name);
+      if (other !== "last" && other !== id && !earlySave(other)?.pending) localStorage.removeItem(name);
     }
   }
 

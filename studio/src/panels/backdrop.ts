@@ -2,7 +2,7 @@
 
 import { type App, fail } from "../app/app";
 import { h } from "../app/dom";
-import { type Backdrop, NONE, keepBackdrop, keptBackdrop, pictureOf } from "../stage/backdrop";
+import { type Backdrop, NONE, storeBackdrop, storedBackdrop, pictureOf } from "../stage/backdrop";
 import type { Scene } from "../stage/scene";
 import { dialog } from "./dialog";
 import { textButton } from "./parts";
@@ -12,7 +12,7 @@ export function backdropDialog(app: App, scene: Scene): void {
     try {
       const backdrop = await next;
       await scene.behind(backdrop);
-      keepBackdrop(backdrop);
+      storeBackdrop(backdrop);
     } catch (error) {
       app.session.update({ dialog: null });
       fail(app, error, "Backdrop");
@@ -32,7 +32,7 @@ export function backdropDialog(app: App, scene: Scene): void {
     oninput: () => void take({ color: color.value, picture: null }),
   }) as HTMLInputElement;
   dialog(app, "backdrop", "Behind the people", () => {
-    color.value = keptBackdrop().color ?? `#${scene.color.getHexString()}`;
+    color.value = storedBackdrop().color ?? `#${scene.color.getHexString()}`;
     return [
       h("p", { class: "quiet" }, "This browser keeps it; it is also in films of the stage."),
       h("label", {}, "Colour", color),
@@ -44,6 +44,6 @@ export function backdropDialog(app: App, scene: Scene): void {
       ),
     ];
   });
-  const kept = keptBackdrop();
+  const kept = storedBackdrop();
   if (kept.color ?? kept.picture) void take(kept);
 }

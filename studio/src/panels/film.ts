@@ -3,7 +3,7 @@
 import { type App, problemOf } from "../app/app";
 import { h } from "../app/dom";
 import { download, fileName } from "../app/files";
-import { type FilmAsked, writeFilm } from "../server/film";
+import { type FilmFormat, writeFilm } from "../server/film";
 import { Filming, type Way, stretch } from "../stage/filming";
 import type { Stage } from "../stage/stage";
 import { dialog } from "./dialog";
@@ -15,7 +15,7 @@ const FPS = { mp4: 30, gif: 20 } as const;
 
 interface Chosen {
   readonly way: Way;
-  readonly format: FilmAsked["format"];
+  readonly format: FilmFormat["format"];
   readonly size: (typeof SIZES)[number];
 }
 
@@ -24,7 +24,7 @@ export function filmOf(
   { format, size }: Pick<Chosen, "format" | "size">,
   [from, to]: readonly [number, number],
   page: readonly [number, number],
-): FilmAsked {
+): FilmFormat {
   const [width, height] = size === "page" ? page : size.split("x").map(Number);
   const even = (pixels: number) => Math.max(Math.floor(pixels / 2) * 2, 64);
   const count = Math.max(Math.round((to - from) * FPS[format]), 2);

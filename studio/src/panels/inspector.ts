@@ -1,16 +1,16 @@
-/** The panel at the right: what is selected, what is asked, the takes and the clips. */
+/** The panel at the right: the selection, its constraints, the takes and the clips. */
 
 import type { Actions } from "../app/actions";
 import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h, morph } from "../app/dom";
-import { measuredIn } from "../app/measured";
-import { type Given, type Project, type Segment, begins, length } from "../project/model";
+import { eventsInBlock } from "../app/blockEvents";
+import { type GoalJson, type Project, type Segment, begins, length } from "../project/model";
 import { notesOf } from "../project/goals";
 import { trackOf } from "../project/tracks";
 import { changeSegment, longestTransition, resizeSegment, setPeople, setTransition } from "../project/timeline";
 import { clipsSection, fanSection, takesSection } from "./takes";
-import { askedPanels } from "./asked";
+import { constraintPanels } from "./constraints";
 import { trackSection } from "./tracks";
 import { markerSection } from "./markers";
 import { numberField, section, textButton, wordsArea, wrong } from "./parts";
@@ -20,7 +20,7 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
   /** What happens in the block that is selected: it is shown once the server has measured it. */
   const measure = async () => {
     const one = selected(app);
-    const lines = one ? await measuredIn(app, one) : [];
+    const lines = one ? await eventsInBlock(app, one) : [];
     if (one !== selected(app) || lines.join() === measured.join()) return;
     measured = lines;
     render();
@@ -30,16 +30,16 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
     const { value } = app.project;
     const { fan, person } = app.session.value;
     const who = Math.min(person, value.people.length - 1);
-    const asked = askedPanels(app, value, value.people[who]!, who, actions, deeds);
+    const constraints = constraintPanels({ app, project: value, person: value.people[who]!, who, actions, deeds });
     const isTool = app.session.value.tool !== "select";
     morph(
       root,
       fan
         ? [fanSection(app, deeds, fan)]
         : [
-            ...(isTool ? asked : []),
+            ...(isTool ? constraints : []),
             words(app, value, deeds, measured, actions),
-            ...(isTool ? [] : asked),
+            ...(isTool ? [] : constraints),
             takesSection(app, value, actions),
             clipsSection(app, value, deeds),
           ],
@@ -86,7 +86,9 @@ function words(app: App, project: Project, deeds: Deeds, measured: readonly stri
         ),
         peopleField(app, project),
       ),
-      kept(project.given, () => app.project.change("drop what the file asked", (old) => ({ ...old, given: null }))),
+      givenGoalSection(project.given, () =>
+        app.project.change("drop what the file asked", (old) => ({ ...old, given: null })),
+      ),
     );
   }
   const two = project.people.length > 1;
@@ -97,7 +99,7 @@ function words(app: App, project: Project, deeds: Deeds, measured: readonly stri
     wrong(app, "segment", one.id),
     ...remarks(project, one, deeds),
     ...measured.map((line) => h("p", { class: "quiet told" }, line)),
-    kept(one.given, () =>
+    givenGoalSection(one.given, () =>
       app.project.change("drop what the file asked", (old) => changeSegment(old, one.id, { given: null })),
     ),
     h(
@@ -151,7 +153,7 @@ function remarks(project: Project, one: Segment, deeds: Deeds): HTMLElement[] {
 }
 
 /** What a timeline file asks besides, and a way to be rid of it. */
-function kept(given: Given | null, drop: () => void): HTMLElement | null {
+function givenGoalSection(given: GoalJson | null, drop: () => void): HTMLElement | null {
   if (!given) return null;
   const goal = typeof given.path === "object" ? Object.keys(given.path ?? {}) : [];
   const names = [...Object.keys(given).filter((key) => key !== "path"), ...goal].join(", ");

@@ -20,7 +20,7 @@ type Chosen = Record<string, string>;
 export function jointDialog(app: App, files: Files): void {
   let chosen: Chosen = {};
   let part: string = JOINTS[0];
-  const said = h("p", { class: "unmet", role: "alert" });
+  const message = h("p", { class: "unmet", role: "alert" });
   const rows = h("div", { class: "parts" });
   const picture = new Picture((joint) => choose(part, joint));
   const unnamed = () => app.session.value.unnamed;
@@ -43,14 +43,14 @@ export function jointDialog(app: App, files: Files): void {
     picture.show(unnamed(), chosen, part);
   };
   const send = async () => {
-    said.textContent = (await files.nameJoints({ ...chosen })) ?? "";
-    if (said.textContent) said.scrollIntoView({ block: "nearest" });
+    message.textContent = (await files.nameJoints({ ...chosen })) ?? "";
+    if (message.textContent) message.scrollIntoView({ block: "nearest" });
   };
   dialog(app, "joints", "Which joint is which?", () => {
     const asked = unnamed()!;
     chosen = { ...asked.guesses };
     part = JOINTS.find((name) => isNeeded(name) && !chosen[name]) ?? JOINTS[0];
-    said.textContent = "";
+    message.textContent = "";
     render();
     return [
       h(
@@ -59,7 +59,7 @@ export function jointDialog(app: App, files: Files): void {
         `${asked.file.name}: its joints have names or an order that say too little. Choose a part at the right, and its joint there or in the picture; what stays free is found from the others.`,
       ),
       h("div", { class: "naming" }, picture.element, rows),
-      said,
+      message,
       h(
         "div",
         { class: "row end" },

@@ -7,7 +7,7 @@ import { dialog } from "./dialog";
 import { shownKey } from "./parts";
 
 /** Actions that a few letters name, the best first; without letters all of them. */
-export function found(actions: readonly Action[], letters: string): Action[] {
+export function matchingActions(actions: readonly Action[], letters: string): Action[] {
   const parts = letters.toLowerCase().split(/\s+/).filter(Boolean);
   const score = ({ label, group, note = "" }: Action): number => {
     const words = `${label} ${group} ${note}`.toLowerCase();
@@ -61,7 +61,7 @@ export function palette(app: App, actions: Actions): void {
   };
   const look = () => {
     const there = Object.values(actions).filter((one) => one !== actions.palette && (one.isThere?.() ?? true));
-    shown = found(there, input.value);
+    shown = matchingActions(there, input.value);
     at = 0;
     render();
   };

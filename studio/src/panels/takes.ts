@@ -5,7 +5,7 @@ import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
 import type { Fan } from "../app/session";
-import { type Clip, type Project, CHANGED, NOTHING_ASKED, keptTake } from "../project/model";
+import { type Clip, type Project, CHANGED, NO_CONSTRAINTS, keptTake } from "../project/model";
 import { GHOSTS } from "../stage/theme";
 import { section, shownKey, textButton } from "./parts";
 
@@ -130,7 +130,7 @@ function clipRow(app: App, project: Project, deeds: Deeds, clip: Clip, index: nu
       () =>
         app.project.change("answer a clip", (old) => ({
           ...old,
-          people: [old.people[0]!, old.people[1] ?? NOTHING_ASKED],
+          people: [old.people[0]!, old.people[1] ?? NO_CONSTRAINTS],
           reactTo: clip,
           base: null,
           frozen: [],

@@ -1,6 +1,6 @@
 /** Least squares in time: dense blocks per frame, and smoothness between frames. */
 
-import { solved } from "./dense";
+import { solveSystem } from "./dense";
 
 /**
  * Diagonal, first and second off-diagonal of the squared second differences of what is asked per frame, times size²;
@@ -62,7 +62,7 @@ export function banded(
       for (let t = 0; t < 2; t += 1) sides[i * (size + 1) + t * n + c] = link(2 * k + s, 2 + t - s);
       sides[i * (size + 1) + size] = x[k * size + i]!;
     }
-    const found = solved(main, sides, size, size + 1);
+    const found = solveSystem(main, sides, size, size + 1);
     const gain = new Float64Array(size * size);
     for (let i = 0; i < size; i += 1) {
       gain.set(found.subarray(i * (size + 1), i * (size + 1) + size), i * size);

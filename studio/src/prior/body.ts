@@ -58,12 +58,12 @@ export function bodyOf(seen: Vec[][], fps: number): Body {
 
 /** Change the turns of each joint over time, in place. */
 export function eachJoint(turns: Turn[][], change: (own: Turn[]) => Turn[]): void {
-  for (const joint of PARENTS.keys()) put(turns, joint, change(column(turns, joint)));
+  for (const joint of PARENTS.keys()) setJoint(turns, joint, change(column(turns, joint)));
 }
 
 const column = <T>(frames: readonly T[][], joint: number): T[] => frames.map((frame) => frame[joint]!);
 
-function put<T>(frames: T[][], joint: number, values: readonly T[]): void {
+function setJoint<T>(frames: T[][], joint: number, values: readonly T[]): void {
   values.forEach((value, f) => (frames[f]![joint] = value));
 }
 
@@ -72,10 +72,10 @@ function solveTrunk(seen: Vec[][], places: Vec[][], world: Turn[][]): void {
   const wide = (a: number, b: number): Vec => minus(REST[a]!, REST[b]!);
   const shoulders = add(wide(LEFT.shoulder, RIGHT.shoulder), wide(LEFT.collar, RIGHT.collar));
   const hips = fitted(seen, PELVIS, [LEFT.hip, RIGHT.hip, SPINE1], shoulders, bone(LEFT.shoulder, RIGHT.shoulder));
-  put(world, PELVIS, smoothed(hips, errors(bone(LEFT.hip, RIGHT.hip), wide(LEFT.hip, RIGHT.hip))));
+  setJoint(world, PELVIS, smoothed(hips, errors(bone(LEFT.hip, RIGHT.hip), wide(LEFT.hip, RIGHT.hip))));
   const [collars, rest] = [bone(LEFT.collar, RIGHT.collar), wide(LEFT.collar, RIGHT.collar)];
   const chest = fitted(seen, SPINE3, [NECK, LEFT.collar, RIGHT.collar], rest, collars);
-  put(world, SPINE3, smoothed(chest, errors(collars, rest)));
+  setJoint(world, SPINE3, smoothed(chest, errors(collars, rest)));
   for (const [joint, child, share] of [[SPINE1, SPINE2, 1 / 3] as const, [SPINE2, SPINE3, 2 / 3] as const]) {
     const bones = bone(child, joint);
     const lean = Math.min(2, (6 * spread(bones.map(norm))) / LENGTHS[child]!);
@@ -161,7 +161,7 @@ function smoothLimbs(seen: readonly Vec[][], turns: Turn[][]): void {
       const [upper, lower] = [norm(minus(at[middle]!, at[start]!)), norm(minus(at[end]!, at[middle]!))];
       return (Math.abs(1 - upper / LENGTHS[middle]!) + Math.abs(1 - lower / LENGTHS[end]!)) / 2;
     });
-    for (const joint of [start, middle]) put(turns, joint, smoothed(column(turns, joint), error));
+    for (const joint of [start, middle]) setJoint(turns, joint, smoothed(column(turns, joint), error));
   }
 }
 

@@ -1,7 +1,7 @@
 /** Small dense matrices of float64, row behind row. */
 
 /** Solve a x = right for symmetric positive a (size * size) and each of `columns` columns of right; by Cholesky. */
-export function solved(a: Float64Array, right: Float64Array, size: number, columns: number): Float64Array {
+export function solveSystem(a: Float64Array, right: Float64Array, size: number, columns: number): Float64Array {
   const lower = a.slice();
   for (let i = 0; i < size; i += 1) {
     for (let j = 0; j <= i; j += 1) {
@@ -47,7 +47,7 @@ export function bell(size: number, width: number): Float64Array {
 }
 
 /** Angles without jumps of more than half a turn. */
-export function unwrapped(angles: readonly number[]): number[] {
+export function unwrapAngles(angles: readonly number[]): number[] {
   const whole = 2 * Math.PI;
   let turns = 0;
   return angles.map((angle, n) => {

@@ -104,19 +104,19 @@ function movedBy(): [number, number][][] {
 }
 
 /** The body with joints at their targets where its bones allow; frames far from all targets stay as they are. */
-export function fitted(body: Body, wanted: readonly Target[]): Body {
+export function fitBody(body: Body, targets: readonly Target[]): Body {
   const places = placesOf(body);
-  const off = wanted.flatMap(({ joint, places: to, asked }) =>
+  const off = targets.flatMap(({ joint, places: to, asked }) =>
     to.map((at, f) => Math.max(...masked(minus(at, places[f]![joint]!), asked[f]!).map(Math.abs))),
   );
   if (!(Math.max(...off, 0) >= DONE)) return body;
-  const windows = around(wanted, places.length);
-  const shift = rootShift(places, wanted, windows);
+  const windows = around(targets, places.length);
+  const shift = rootShift(places, targets, windows);
   const goal = inReach(
     places.map((at, f) => at.map((one) => add(one, shift[f]!))),
-    wanted,
+    targets,
   ).map(({ asked, ...one }): Weighted => ({ ...one, weights: asked.map((axes) => scaled(axes, 1 / EXACT)) }));
-  const feet = feetOf(places, shift, wanted, body.fps);
+  const feet = feetOf(places, shift, targets, body.fps);
   const [root, turns] = [[...body.root], [...body.turns]];
   for (const [start, stop] of windows) {
     const crop = (one: Weighted): Weighted => ({
@@ -134,11 +134,11 @@ export function fitted(body: Body, wanted: readonly Target[]): Body {
 }
 
 const masked = (v: Vec, by: Vec): Vec => [v[0] * by[0], v[1] * by[1], v[2] * by[2]];
-const isAsked = (axes: Vec): boolean => axes.some((one) => one > 0);
+const hasTarget = (axes: Vec): boolean => axes.some((one) => one > 0);
 
 /** Stretches of frames around targets. */
-function around(wanted: readonly Target[], frames: number): (readonly [number, number])[] {
-  const asked = Array.from({ length: frames }, (_, f) => wanted.some((one) => isAsked(one.asked[f]!)));
+function around(targets: readonly Target[], frames: number): (readonly [number, number])[] {
+  const asked = Array.from({ length: frames }, (_, f) => targets.some((one) => hasTarget(one.asked[f]!)));
   return spans(near(asked, ROUND));
 }
 
@@ -156,8 +156,8 @@ function chain(joint: number): [number, number] {
 }
 
 /** The targets, those out of reach brought as near to the body as it can follow them. */
-function inReach(places: readonly Vec[][], wanted: readonly Target[]): Target[] {
-  return wanted.map((one) => {
+function inReach(places: readonly Vec[][], targets: readonly Target[]): Target[] {
+  return targets.map((one) => {
     const [base, length] = chain(one.joint);
     const moved = one.places.map((at, f): Vec => {
       const centre = places[f]![base]!;
@@ -207,16 +207,16 @@ function rootShift(
 }
 
 /** Where the feet go when the body goes by `shift`; one of whose leg something is asked is free around then. */
-function feetOf(places: readonly Vec[][], shift: readonly Vec[], wanted: readonly Target[], fps: number): Weighted[] {
+function feetOf(places: readonly Vec[][], shift: readonly Vec[], targets: readonly Target[], fps: number): Weighted[] {
   const planted = plantedFeet(places, fps, null);
   return [LEFT, RIGHT].flatMap((side, n) => {
     const moved = carried(
       shift,
       planted.map((flags) => flags[2 * n]! || flags[2 * n + 1]!),
     );
-    const own = wanted.filter(({ joint }) => [side.knee, side.ankle, side.foot].includes(joint));
+    const own = targets.filter(({ joint }) => [side.knee, side.ankle, side.foot].includes(joint));
     const free = near(
-      places.map((_, f) => own.some((one) => isAsked(one.asked[f]!))),
+      places.map((_, f) => own.some((one) => hasTarget(one.asked[f]!))),
       6,
     );
     return [2 * n, 2 * n + 1].map((k) => {
@@ -263,7 +263,7 @@ class Pose {
   }
 
   /** Places and turns in the world. */
-  seen(f: number): { places: Vec[]; world: Turn[] } {
+  pose(f: number): { places: Vec[]; world: Turn[] } {
     const [root, turns] = this.posed(f);
     const [places, world]: [Vec[], Turn[]] = [[root], [turns[0]!]];
     for (let joint = 1; joint < PARENTS.length; joint += 1) {
@@ -321,7 +321,7 @@ function solve(pose: Pose, goal: readonly Weighted[], feet: readonly Weighted[],
   const begun = pose.change;
   pose.change = new Float64Array(begun.length);
   const limits = Array.from({ length: pose.frames }, (_, f) =>
-    bends(pose.seen(f)).map((bent, n) => {
+    bends(pose.pose(f)).map((bent, n) => {
       const { size } = HINGES[n]!;
       return [(Math.min(bent, BEND[0]) - bent) / size, (Math.max(bent, BEND[1]) - bent) / size] as const;
     }),
@@ -329,7 +329,7 @@ function solve(pose: Pose, goal: readonly Weighted[], feet: readonly Weighted[],
   pose.change = begun;
   let [damping, best, cost, last] = [1e-3, pose.change, Infinity, Infinity];
   for (let step = 0; step < STEPS; step += 1) {
-    const seen = Array.from({ length: pose.frames }, (_, f) => pose.seen(f));
+    const seen = Array.from({ length: pose.frames }, (_, f) => pose.pose(f));
     const [now, off] = costOf(pose, seen, targets, goal.length, bands);
     if (now > cost) {
       damping *= 10;
@@ -352,12 +352,12 @@ function solve(pose: Pose, goal: readonly Weighted[], feet: readonly Weighted[],
   pose.change = best;
 }
 
-type Seen = { places: Vec[]; world: Turn[] };
+type Posed = { places: Vec[]; world: Turn[] };
 
 /** What is minimised, and metres that the first `count` targets are off at most. */
 function costOf(
   pose: Pose,
-  seen: readonly Seen[],
+  seen: readonly Posed[],
   targets: readonly Weighted[],
   count: number,
   bands: readonly Float64Array[],
@@ -384,7 +384,7 @@ function costOf(
 /** The blocks and right side of the normal equations, frame by frame. */
 function normal(
   pose: Pose,
-  seen: readonly Seen[],
+  seen: readonly Posed[],
   targets: readonly Weighted[],
   damping: number,
 ): [Float64Array[], Float64Array] {

@@ -1,5 +1,6 @@
 /** Arms and legs from places: two bones, and a hinge whose turn about the limb is smooth (`motionloom.kinematics.ik`). */
 
+import { unwrapAngles } from "./dense";
 import { LENGTHS, LIMBS, type Limb, REST } from "./person";
 import {
   type Turn,
@@ -160,7 +161,7 @@ function smoothAngles(
     const [w, v, [p, q]] = [strength[f]!, weak[f]!, hint[f]!];
     return [w * x + v * p, w * y + v * q];
   });
-  let angle = unwrapped(tridiagonal(all, stiffness, mixed).map(([x, y]) => Math.atan2(y!, x!)));
+  let angle = unwrapAngles(tridiagonal(all, stiffness, mixed).map(([x, y]) => Math.atan2(y!, x!)));
   for (let round = 0; round < 4; round += 1) {
     const off = ([x, y]: Complex, a: number) =>
       Math.atan2(y * Math.cos(a) - x * Math.sin(a), x * Math.cos(a) + y * Math.sin(a));
@@ -168,15 +169,6 @@ function smoothAngles(
     angle = tridiagonal(all, stiffness, right).map(([a]) => a!);
   }
   return angle;
-}
-
-function unwrapped(angles: readonly number[]): number[] {
-  let [turn, before] = [0, angles[0] ?? 0];
-  return angles.map((angle) => {
-    turn -= Math.round((angle - before) / (2 * Math.PI)) * 2 * Math.PI;
-    before = angle;
-    return angle + turn;
-  });
 }
 
 function between(x: number, [low, high]: readonly [number, number]): number {

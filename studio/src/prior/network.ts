@@ -13,7 +13,7 @@ export interface Runtime {
 }
 
 /** A text as the layers of the prior want it. */
-export interface Asked {
+export interface Condition {
   /** (width) */
   readonly text: Float32Array;
   /** (layers, heads, words, head width) */
@@ -26,7 +26,7 @@ export interface Asked {
 export interface Row {
   readonly state: Float32Array;
   readonly level: number;
-  readonly asked: Asked;
+  readonly asked: Condition;
 }
 
 type Numbers = TypedTensor<"float32">;
@@ -37,7 +37,7 @@ export class Failed extends Error {}
 
 export class Network {
   private readonly pieces: WordPiece;
-  private readonly nothing: Promise<Asked>;
+  private readonly nothing: Promise<Condition>;
   /** The call that was made last. */
   private last: Promise<unknown> = Promise.resolve();
 
@@ -69,7 +69,7 @@ export class Network {
   }
 
   /** What the prior is asked with a text; an empty one asks for nothing in particular. */
-  async ask(text: string): Promise<Asked> {
+  async ask(text: string): Promise<Condition> {
     if (!text.trim()) return this.nothing;
     const ids = this.tokens(text);
     const pieces = this.packed.tensor("text.words.weight", ids);
@@ -97,7 +97,7 @@ export class Network {
     );
   }
 
-  private async bound(pooled: Float32Array, tokens: Float32Array, words: number): Promise<Asked> {
+  private async bound(pooled: Float32Array, tokens: Float32Array, words: number): Promise<Condition> {
     const { text, keys, values } = (await this.run("bind", {
       pooled: this.floats(pooled, [1, pooled.length]),
       tokens: this.floats(tokens, [1, words, pooled.length]),

@@ -1,6 +1,6 @@
 /** A path on the ground through points, walked at even speed (`motionloom.goals.paths`). */
 
-import { sums, unwrapped } from "./dense";
+import { sums, unwrapAngles } from "./dense";
 import type { GroundPose } from "./features";
 import { clip } from "./turns";
 
@@ -127,7 +127,7 @@ export function along(places: readonly Place[], fps: number): number[] {
   const steps = places.slice(1).map((at, n): Place => [at[0] - places[n]![0], at[1] - places[n]![1]]);
   const moving = [...steps.keys()].filter((n) => Math.hypot(...steps[n]!) * fps > STANDING);
   if (!moving.length) return places.map(() => 0);
-  const angle = unwrapped(moving.map((n) => Math.atan2(...steps[n]!)));
+  const angle = unwrapAngles(moving.map((n) => Math.atan2(...steps[n]!)));
   const turn = places.map((_, f) => between(f - 0.5, moving, angle));
   const [last, near] = [moving.length - 1, (a: number, b: number): boolean => Math.abs(angle[a]! - angle[b]!) < 0.3];
   if (last > 0 && moving[0] === 0 && moving[1] === 1 && near(0, 1)) turn[0] = angle[0]! - (angle[1]! - angle[0]!) / 2;

@@ -7,14 +7,14 @@ import { bodyOf } from "./body";
 import { type GroundPose, ORIGIN, WIDTH, contacts, decoded, smooth } from "./features";
 import { cleanFeet } from "./feet";
 import { Noise } from "./noise";
-import type { Asked, Network } from "./network";
+import type { Condition, Network } from "./network";
 import type { Body } from "./person";
 import { type Place, type Way, seenFrom, startOf, wayThrough } from "./path";
 import { cosine, levels, move } from "./schedule";
 import { supported } from "./stairs";
 import { Steering } from "./steering";
 import { type Vec, rounded } from "./turns";
-import { type Part, TRANSITION } from "./wanted";
+import { type Part, TRANSITION } from "./amounts";
 
 export interface Segment {
   readonly text: string;
@@ -216,7 +216,7 @@ class Link {
     readonly length: number,
     readonly before: number,
     readonly after: number,
-    readonly asked: Asked,
+    readonly asked: Condition,
     seed: bigint,
     readonly steering: Steering | null,
   ) {

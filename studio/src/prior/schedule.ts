@@ -10,10 +10,10 @@ export interface Schedule {
 
 /** Nichol and Dhariwal 2021, eq. 17, with betas cut at 0.999. */
 export function cosine(steps: number): Schedule {
-  const kept = (u: number): number => Math.cos((((u + 0.008) / 1.008) * Math.PI) / 2) ** 2;
+  const alphaBar = (u: number): number => Math.cos((((u + 0.008) / 1.008) * Math.PI) / 2) ** 2;
   const bars = [1];
   for (let n = 0; n < steps; n += 1) {
-    const beta = Math.min(Math.max(1 - kept((n + 1) / steps) / kept(n / steps), 0), 0.999);
+    const beta = Math.min(Math.max(1 - alphaBar((n + 1) / steps) / alphaBar(n / steps), 0), 0.999);
     bars.push(bars[n]! * (1 - beta));
   }
   return { signal: bars.map(Math.sqrt), noise: bars.map((bar) => Math.sqrt(1 - bar)) };
@@ -32,6 +32,6 @@ export function levels(top: number, steps: number): number[] {
 /** Factors of the estimate, the state and fresh noise in the move from level t to s (Ho et al. 2020, eq. 7). */
 export function move({ signal, noise }: Schedule, t: number, s: number): readonly [number, number, number] {
   const r = (signal[t]! * noise[s]!) / (signal[s]! * noise[t]!);
-  const kept = (noise[s]! * r) / noise[t]!;
-  return [signal[s]! - kept * signal[t]!, kept, noise[s]! * Math.sqrt(1 - r * r)];
+  const carried = (noise[s]! * r) / noise[t]!;
+  return [signal[s]! - carried * signal[t]!, carried, noise[s]! * Math.sqrt(1 - r * r)];
 }

@@ -6,7 +6,7 @@ import { type Place, startOf } from "./path";
 import { type Body, placesOf } from "./person";
 import type { Prior, Segment, Watcher } from "./prior";
 import { rounded } from "./turns";
-import { measured, missed, nextShare, partsOf, reading } from "./wanted";
+import { measured, missed, nextShare, partsOf, reading } from "./amounts";
 
 /** Tries of a motion whose steps are not as many as the words say. */
 const TRIES = 6;

@@ -4,7 +4,7 @@
  */
 
 import { cleanFeet, type Span, spans } from "./feet";
-import { type Target, fitted } from "./fit";
+import { type Target, fitBody } from "./fit";
 import { between } from "./path";
 import { type Body, HEAD, LEFT, RIGHT, placesOf } from "./person";
 import { type Vec, add, minus, norm, rounded, scaled } from "./turns";
@@ -74,7 +74,7 @@ function onStairs(body: Body, places: readonly Vec[][]): Body {
     ),
     odd(body.fps / 2),
   );
-  return fitted({ ...body, root: body.root.map((at, f) => add(at, [0, lift[f]!, 0])) }, wanted);
+  return fitBody({ ...body, root: body.root.map((at, f) => add(at, [0, lift[f]!, 0])) }, wanted);
 }
 
 /** Lowered by as much as the lowest joint is above the floor, a quarter of a second averaged. */
@@ -96,7 +96,7 @@ function aboveFloor(body: Body): Body {
       asked: places.map((at): Vec => [0, at[joint]![1] < rest - SUNK ? 1 : 0, 0]),
     };
   });
-  return fitted(body, wanted);
+  return fitBody(body, wanted);
 }
 
 /** Whether somebody is above the floor for longer than a jump takes, of the heights of the lowest joint. */

@@ -4,7 +4,7 @@
  */
 
 import { LEFT, RIGHT } from "../body/skeleton";
-import { bell, product, solved, sums, unwrapped } from "./dense";
+import { bell, product, solveSystem, sums, unwrapAngles } from "./dense";
 import { CONTACTS, WIDTH } from "./features";
 import type { Way } from "./path";
 import { stilled } from "./stances";
@@ -88,7 +88,7 @@ export class Steering {
         inner[i * count + j] = scale * pace[(i + this.first) * size + j + this.first]! + (i === j ? noise : 0);
       for (let j = 0; j < size; j += 1) outer[i * size + j] = scale * pace[(i + this.first) * size + j]!;
     }
-    const found = solved(inner, outer, count, size);
+    const found = solveSystem(inner, outer, count, size);
     return Float64Array.from({ length: size * count }, (_, n) => found[(n % count) * size + Math.floor(n / count)]!);
   }
 
@@ -100,7 +100,7 @@ export class Steering {
     const { facing } = this.way;
     if (facing) {
       const ahead = headings(features, now.facing);
-      const error = unwrapped(facing.slice(0, this.asked).map((angle, n) => half(angle - ahead[n + this.first]!)));
+      const error = unwrapAngles(facing.slice(0, this.asked).map((angle, n) => half(angle - ahead[n + this.first]!)));
       const change = product(plan.turn, error);
       now = { ...now, facing: now.facing.map((angle, f) => angle + change[f]!) };
     }
@@ -196,7 +196,7 @@ function turningWith(old: Estimate, now: Estimate, first: number): number[] {
     kernel,
     after.map(([a, b], f) => b * before[f]![0] - a * before[f]![1]),
   );
-  const angle = unwrapped(real.map((x, f) => Math.atan2(imaginary[f]!, x + weight[f]! * SLOW ** 2)));
+  const angle = unwrapAngles(real.map((x, f) => Math.atan2(imaginary[f]!, x + weight[f]! * SLOW ** 2)));
   const whole = 2 * Math.PI * Math.round(angle[first]! / (2 * Math.PI));
   return angle.map((one, f) => (one - whole) * (1 - Math.exp(-0.5 * ((f - first) / TURN_OVER) ** 2)));
 }

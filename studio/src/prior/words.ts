@@ -44,16 +44,16 @@ const NUMBER = "(\\d+(?:\\.\\d+)?)";
 const SMALL_STEPS = listed("small tiny short baby little");
 const LARGE_STEPS = listed("big large long giant huge");
 
-const all = (name: Pattern, said: string): RegExpMatchArray[] => [...said.matchAll(PATTERNS[name])];
-const first = (name: Pattern, said: string): RegExpMatchArray | undefined => all(name, said)[0];
+const all = (name: Pattern, phrase: string): RegExpMatchArray[] => [...phrase.matchAll(PATTERNS[name])];
+const first = (name: Pattern, phrase: string): RegExpMatchArray | undefined => all(name, phrase)[0];
 
 /** A text with its numbers in digits, in small letters where `lower`: "three and a half" becomes 3.5. */
 export function inDigits(text: string, lower = true): string {
-  const said = lower ? text.toLowerCase().replaceAll(",", " ").split(/\s+/).filter(Boolean).join(" ") : text;
+  const phrase = lower ? text.toLowerCase().replaceAll(",", " ").split(/\s+/).filter(Boolean).join(" ") : text;
   const [small, tens] = [tables.small as Record<string, number>, tables.tens as Record<string, number>];
   const below = (words: string): number =>
     words.split(/[ -]/).reduce((sum, one) => sum + (small[one] ?? tens[one] ?? 0), 0);
-  return said
+  return phrase
     .replace(PATTERNS.number_words, (...found) => {
       const { plain, hundreds, rest } = found.at(-1) as Record<string, string | undefined>;
       return String(plain ? below(plain) : 100 * (small[hundreds!] ?? 1) + (rest ? below(rest) : 0));
@@ -67,15 +67,15 @@ export function inDigits(text: string, lower = true): string {
 
 /** What the words of one action ask for in numbers; null without. */
 export function readAmount(text: string): Amount | null {
-  let said = inDigits(text);
+  let phrase = inDigits(text);
   const verbs = new Set(
-    (said.match(/[a-z]+/g) ?? []).flatMap((word) => (word === "left" ? [] : (BASES.get(word) ?? []))),
+    (phrase.match(/[a-z]+/g) ?? []).flatMap((word) => (word === "left" ? [] : (BASES.get(word) ?? []))),
   );
-  said = said.replace(PATTERNS.ages, " ");
-  const times = repetitions(said);
+  phrase = phrase.replace(PATTERNS.ages, " ");
+  const times = repetitions(phrase);
   if (times) return times;
   if (!verbs.size || has(verbs, IN_PLACE)) return null;
-  return turn(said, verbs) ?? arc(said, verbs) ?? steps(said, verbs) ?? way(said, verbs);
+  return turn(phrase, verbs) ?? arc(phrase, verbs) ?? steps(phrase, verbs) ?? way(phrase, verbs);
 }
 
 /** The seconds that "for ten seconds" asks for; null without, and beyond a minute. */
@@ -91,16 +91,16 @@ const ENDS = listed("stop halt pause");
 
 /** Whether a sentence says several actions one after the other, or may; a stop is only the end of one. */
 export function isSeveral(text: string): boolean {
-  const said = text.toLowerCase().trim();
-  const next = [...said.matchAll(NEXT)].map(([, word]) => BASES.get(word!));
-  return /\bthen\b|[;.]\s+\S/.test(said) || next.some((verb) => verb !== undefined && !ENDS.has(verb));
+  const phrase = text.toLowerCase().trim();
+  const next = [...phrase.matchAll(NEXT)].map(([, word]) => BASES.get(word!));
+  return /\bthen\b|[;.]\s+\S/.test(phrase) || next.some((verb) => verb !== undefined && !ENDS.has(verb));
 }
 
 /** The words of one stroke of what is counted: "a person jumps" of "a person jumps three times". */
 export function once(text: string): string {
-  const said = inDigits(text, false);
-  let less = said.replace(PATTERNS.often, "");
-  if (less === said) less = said.replace(new RegExp(`\\b${NUMBER} (?=(?:[a-z]+ )?[a-z]+)`), "");
+  const phrase = inDigits(text, false);
+  let less = phrase.replace(PATTERNS.often, "");
+  if (less === phrase) less = phrase.replace(new RegExp(`\\b${NUMBER} (?=(?:[a-z]+ )?[a-z]+)`), "");
   return less
     .trim()
     .split(/\s+/)
@@ -128,25 +128,25 @@ const sideways = (side: string): Direction => (side === "left" ? "left" : "right
 const often = (word: string, number: string | undefined): number =>
   ({ once: 1, twice: 2, thrice: 3 })[word] ?? Number(number);
 /** How often it is said that something is done, "at once" aside. */
-const oftenIn = (said: string): RegExpMatchArray[] => all("often", said.replace(PATTERNS.often_kept, " "));
+const oftenIn = (phrase: string): RegExpMatchArray[] => all("often", phrase.replace(PATTERNS.often_kept, " "));
 
-function repetitions(said: string): Amount | null {
-  const [times, many] = [oftenIn(said), all("many", said)];
-  if (times.length + many.length !== 1 || /\b(?:while|every|per)\b/.test(said)) return null;
+function repetitions(phrase: string): Amount | null {
+  const [times, many] = [oftenIn(phrase), all("many", phrase)];
+  if (times.length + many.length !== 1 || /\b(?:while|every|per)\b/.test(phrase)) return null;
   let kinds = (Object.entries(tables.counted) as [Counted, string][])
-    .filter(([, words]) => new RegExp(`\\b(?:${words})\\b`).test(said))
+    .filter(([, words]) => new RegExp(`\\b(?:${words})\\b`).test(phrase))
     .map(([what]) => what);
   if (kinds.includes("jumping jacks")) kinds = kinds.filter((what) => what !== "jumps");
   const size = many[0] ? Number(many[0][1]) : often(times[0]![1]!, times[0]![2]);
   if (kinds.length !== 1 || !Number.isInteger(size) || size < 1 || size > MOST_TIMES) return null;
-  const side = sideOf(said);
+  const side = sideOf(phrase);
   return amount("count", size, side ? sideways(side) : "forward", { of: kinds[0]! });
 }
 
-function turn(said: string, verbs: ReadonlySet<string>): Amount | null {
-  if (!has(verbs, TURNING) || first("body", said) || has(verbs, listed("throw look"))) return null;
-  const [found, part] = [all("degrees", said), first("part_of_turn", said)];
-  const [whole, times] = [first("turns_often", said), oftenIn(said)[0]];
+function turn(phrase: string, verbs: ReadonlySet<string>): Amount | null {
+  if (!has(verbs, TURNING) || first("body", phrase) || has(verbs, listed("throw look"))) return null;
+  const [found, part] = [all("degrees", phrase), first("part_of_turn", phrase)];
+  const [whole, times] = [first("turns_often", phrase), oftenIn(phrase)[0]];
   if (found.length > 1 || Number(found.length > 0) + Number(!!part) + Number(!!(whole ?? times)) !== 1) return null;
   const parts: Record<string, number> = { half: 180, "0.5": 180, quarter: 90, full: 360 };
   const degrees = whole
@@ -156,72 +156,72 @@ function turn(said: string, verbs: ReadonlySet<string>): Amount | null {
       : found[0]
         ? Number(found[0][1])
         : (parts[part![1]!] ?? 270);
-  const named = /\b(?:left|right)\b/.test(said);
-  const side = sideOf(said) || (degrees % 180 === 0 && !named ? "left" : "");
+  const named = /\b(?:left|right)\b/.test(phrase);
+  const side = sideOf(phrase) || (degrees % 180 === 0 && !named ? "left" : "");
   const goes = [...verbs].some((verb) => GOING.has(verb) && verb !== "step" && verb !== "back");
   if (!side || degrees < 5 || degrees > MOST_DEGREES || goes) return null;
   return amount("turn", degrees, sideways(side));
 }
 
-function arc(said: string, verbs: ReadonlySet<string>): Amount | null {
-  const [part, side] = [first("arc", said), sideOf(said)];
-  if (!(part ?? first("circle", said)) || !side || !has(verbs, GOING) || first("body", said)) return null;
+function arc(phrase: string, verbs: ReadonlySet<string>): Amount | null {
+  const [part, side] = [first("arc", phrase), sideOf(phrase)];
+  if (!(part ?? first("circle", phrase)) || !side || !has(verbs, GOING) || first("body", phrase)) return null;
   const size = part?.[1] ?? "full";
   const degrees = size === "quarter" ? 90 : ["half", "semi", "0.5"].includes(size) ? 180 : 360;
   const metres = (RADIUS * degrees * Math.PI) / 180;
-  return amount("arc", degrees, sideways(side), { metres, speed: pace(said, verbs), backward: isBackward(said) });
+  return amount("arc", degrees, sideways(side), { metres, speed: pace(phrase, verbs), backward: isBackward(phrase) });
 }
 
-function steps(said: string, verbs: ReadonlySet<string>): Amount | null {
-  const found = all("steps", said);
-  if (found.length !== 1 || !has(verbs, STEPPING) || first("else", said)) return null;
-  const [[, number, size = ""], direction] = [found[0]!, directionOf(said, true)];
+function steps(phrase: string, verbs: ReadonlySet<string>): Amount | null {
+  const found = all("steps", phrase);
+  if (found.length !== 1 || !has(verbs, STEPPING) || first("else", phrase)) return null;
+  const [[, number, size = ""], direction] = [found[0]!, directionOf(phrase, true)];
   const count = number ? Number(number) : 1;
   if (!direction || !Number.isInteger(count) || count < 1 || count > MOST_STEPS) return null;
   const share = SMALL_STEPS.has(size) ? 0.6 : LARGE_STEPS.has(size) ? 1.3 : 1;
   const stride = (direction === "forward" ? 0.62 : 0.4) * share;
-  const seconds = direction !== "forward" || isSlow(said) ? 0.5 : verbs.has("run") ? 0.4 : 0.45;
+  const seconds = direction !== "forward" || isSlow(phrase) ? 0.5 : verbs.has("run") ? 0.4 : 0.45;
   return amount("steps", count, direction, { metres: count * stride, speed: stride / seconds });
 }
 
-function way(said: string, verbs: ReadonlySet<string>): Amount | null {
-  const found = all("way", said);
-  const direction = directionOf(said, verbs.has("move") || verbs.has("step"));
-  if (found.length !== 1 || !direction || !has(verbs, GOING) || first("else", said)) return null;
+function way(phrase: string, verbs: ReadonlySet<string>): Amount | null {
+  const found = all("way", phrase);
+  const direction = directionOf(phrase, verbs.has("move") || verbs.has("step"));
+  if (found.length !== 1 || !direction || !has(verbs, GOING) || first("else", phrase)) return null;
   if ([...verbs].some((verb) => !GOING.has(verb) && !BESIDE.has(verb))) return null;
   const [, number, unit] = found[0]!;
   const exact = Number(number) * (UNITS[unit!] ?? UNITS[unit!.replace(/s$/, "")]!);
   if (exact < 0.2 || exact > MOST_METRES) return null;
   const metres = rounded(exact * 1000) / 1000;
-  return amount("way", metres, direction, { metres, speed: pace(said, verbs) });
+  return amount("way", metres, direction, { metres, speed: pace(phrase, verbs) });
 }
 
-function pace(said: string, verbs: ReadonlySet<string>): number {
+function pace(phrase: string, verbs: ReadonlySet<string>): number {
   let found = PACES[[...verbs].find((verb) => verb in PACES) ?? ""] ?? WALKING;
-  const direction = directionOf(said, false);
-  if (isBackward(said)) found *= 0.65;
+  const direction = directionOf(phrase, false);
+  if (isBackward(phrase)) found *= 0.65;
   else if (direction === "left" || direction === "right") found = Math.min(found, 0.7);
-  if (isSlow(said)) return 0.65 * found;
-  return /\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b/.test(said) ? 1.35 * found : found;
+  if (isSlow(phrase)) return 0.65 * found;
+  return /\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b/.test(phrase) ? 1.35 * found : found;
 }
 
-const isSlow = (said: string): boolean => /\b(?:slowly|slow|carefully|careful|cautiously|gently)\b/.test(said);
-const isBackward = (said: string): boolean => /\b(?:backwards?|back|in reverse|rearwards?)\b/.test(said);
+const isSlow = (phrase: string): boolean => /\b(?:slowly|slow|carefully|careful|cautiously|gently)\b/.test(phrase);
+const isBackward = (phrase: string): boolean => /\b(?:backwards?|back|in reverse|rearwards?)\b/.test(phrase);
 
 /** The one side that is said, seen from above for clockwise; empty for none and for both. */
-function sideOf(said: string): string {
-  if (/\b(?:counter|anti)[ -]?clockwise\b/.test(said)) return "left";
-  if (/\bclockwise\b/.test(said)) return "right";
-  const found = said.matchAll(/\b(left|right)(?!(?:[ -]handed| after| before| away| in front))(?:wards?)?\b/g);
+function sideOf(phrase: string): string {
+  if (/\b(?:counter|anti)[ -]?clockwise\b/.test(phrase)) return "left";
+  if (/\bclockwise\b/.test(phrase)) return "right";
+  const found = phrase.matchAll(/\b(left|right)(?!(?:[ -]handed| after| before| away| in front))(?:wards?)?\b/g);
   const sides = new Set([...found].map(([, side]) => side!));
   return sides.size === 1 ? [...sides][0]! : "";
 }
 
 /** Where a way leads; null where that is not clear. `aside`: a side alone is enough for a step to it. */
-function directionOf(said: string, aside: boolean): Direction | null {
-  const [back, side, named] = [isBackward(said), sideOf(said), /\b(?:left|right)\b/.test(said)];
-  const across = /\b(?:sideways?|side[ -]?steps?|sidestepping|side steps?|laterally)\b/.test(said);
+function directionOf(phrase: string, aside: boolean): Direction | null {
+  const [back, side, named] = [isBackward(phrase), sideOf(phrase), /\b(?:left|right)\b/.test(phrase)];
+  const across = /\b(?:sideways?|side[ -]?steps?|sidestepping|side steps?|laterally)\b/.test(phrase);
   if (across || (aside && named)) return !side || back ? null : sideways(side);
-  if (named || (back && /\bforwards?\b/.test(said))) return null;
+  if (named || (back && /\bforwards?\b/.test(phrase))) return null;
   return back ? "backward" : "forward";
 }

@@ -3,7 +3,7 @@
 import { JOINTS } from "../body/skeleton";
 import { SMOOTHEST, isPart } from "./tracks";
 import {
-  type Given,
+  type GoalJson,
   type Project,
   type Stamp,
   type Track,
@@ -32,21 +32,21 @@ export function filed(project: Project, { id, revision }: Stamp): Record<string,
 }
 
 /** Which project a file is of; null: it does not say, as files of version 1. */
-export function stampOf(found: unknown): Stamp | null {
-  const { id, revision } = (found ?? {}) as Mapping;
+export function stampOf(json: unknown): Stamp | null {
+  const { id, revision } = (json ?? {}) as Mapping;
   const isStamp = typeof id === "string" && /^[\w-]{1,80}$/.test(id) && Number.isSafeInteger(revision);
   return isStamp ? { id, revision: revision as number } : null;
 }
 
 /** Read what `written` wrote; raises `ProjectError` with a sentence. */
 export function read(text: string): Project {
-  let found: unknown;
+  let json: unknown;
   try {
-    found = JSON.parse(text);
+    json = JSON.parse(text);
   } catch {
     throw new ProjectError("This is no project file: it is not JSON; choose a file that the studio saved.");
   }
-  return checked(found);
+  return checked(json);
 }
 
 /** The project in a parsed value, with what is missing as in an empty one. */
@@ -82,14 +82,14 @@ export function checked(found: unknown): Project {
     clips: list(top.clips ?? [], "clips", 100).map((one, index) => clip(one, `clips[${index}]`)),
     markers: list(top.markers ?? [], "markers", MOST_POINTS).map((one, index) => marker(one, `markers[${index}]`)),
     character: top.character ? character(top.character) : null,
-    given: given(top.given, "given"),
+    given: goalOf(top.given, "given"),
   };
 }
 
 type Mapping = Record<string, unknown>;
 
-function marker(found: unknown, name: string) {
-  const one = mapping(found, name);
+function marker(json: unknown, name: string) {
+  const one = mapping(json, name);
   return {
     id: word(one.id, `${name}.id`),
     time: number(one.time, `${name}.time`, 0, LONGEST * MOST_SEGMENTS),
@@ -97,34 +97,34 @@ function marker(found: unknown, name: string) {
   };
 }
 
-function segment(found: unknown, name: string) {
-  const one = mapping(found, name);
+function segment(json: unknown, name: string) {
+  const one = mapping(json, name);
   return {
     id: word(one.id, `${name}.id`),
     text: word(one.text, `${name}.text`),
     other: word(one.other ?? "", `${name}.other`),
     seconds: number(one.seconds, `${name}.seconds`, SHORTEST, LONGEST),
     transition: one.transition == null ? null : number(one.transition, `${name}.transition`, 0.05, LONGEST / 2),
-    given: given(one.given, `${name}.given`),
+    given: goalOf(one.given, `${name}.given`),
   };
 }
 
 /** Parts of a timeline file that the server reads and the page only keeps. */
-function given(found: unknown, name: string): Given | null {
-  if (found == null) return null;
-  if (JSON.stringify(found).length > MOST_GIVEN)
+function goalOf(json: unknown, name: string): GoalJson | null {
+  if (json == null) return null;
+  if (JSON.stringify(json).length > MOST_GIVEN)
     throw new ProjectError(`${name} holds more than ${MOST_GIVEN / 1e6} million characters; shorten it.`);
-  return mapping(found, name);
+  return mapping(json, name);
 }
 
-function person(found: unknown, name: string) {
-  const asked = mapping(found, name);
-  const path = asked.path ? mapping(asked.path, `${name}.path`) : null;
+function person(json: unknown, name: string) {
+  const entries = mapping(json, name);
+  const path = entries.path ? mapping(entries.path, `${name}.path`) : null;
   return {
     path: path && {
       times: path.times ? numbers(path.times, `${name}.path.times`, list(path.points, name, MOST_POINTS).length) : null,
       speed: path.speed == null ? null : number(path.speed, `${name}.path.speed`, 0.05, 12),
-      given: given(path.given, `${name}.path.given`),
+      given: goalOf(path.given, `${name}.path.given`),
       points: list(path.points, `${name}.path.points`, MOST_POINTS).map((one, index) => {
         const at = `${name}.path.points[${index}]`;
         const point = mapping(one, at);
@@ -136,7 +136,7 @@ function person(found: unknown, name: string) {
         };
       }),
     },
-    targets: list(asked.targets ?? [], `${name}.targets`, MOST_POINTS).map((one, index) => {
+    targets: list(entries.targets ?? [], `${name}.targets`, MOST_POINTS).map((one, index) => {
       const at = `${name}.targets[${index}]`;
       const target = mapping(one, at);
       return {
@@ -147,7 +147,7 @@ function person(found: unknown, name: string) {
         position: place(target.position, `${at}.position`),
       };
     }),
-    poses: list(asked.poses ?? [], `${name}.poses`, 200).map((one, index) => {
+    poses: list(entries.poses ?? [], `${name}.poses`, 200).map((one, index) => {
       const at = `${name}.poses[${index}]`;
       const pose = mapping(one, at);
       const positions = list(pose.positions, `${at}.positions`, JOINTS.length).map((row) =>
@@ -162,12 +162,14 @@ function person(found: unknown, name: string) {
         positions,
       };
     }),
-    tracks: list(asked.tracks ?? [], `${name}.tracks`, 200).map((one, index) => track(one, `${name}.tracks[${index}]`)),
+    tracks: list(entries.tracks ?? [], `${name}.tracks`, 200).map((one, index) =>
+      track(one, `${name}.tracks[${index}]`),
+    ),
   };
 }
 
-function track(found: unknown, name: string): Track {
-  const one = mapping(found, name);
+function track(json: unknown, name: string): Track {
+  const one = mapping(json, name);
   const part = word(one.part, `${name}.part`);
   if (!isPart(part)) throw new ProjectError(`${name}.part is ${shown(part)}, which names no part of the body.`);
   return {
@@ -182,47 +184,49 @@ function track(found: unknown, name: string): Track {
   };
 }
 
-function take(found: unknown, name: string) {
-  const given = mapping(found, name);
+function take(json: unknown, name: string) {
+  const entries = mapping(json, name);
   return {
-    motion: motionId(given.motion, `${name}.motion`),
-    seed: number(given.seed ?? 0, `${name}.seed`, 0, 2 ** 62),
-    seconds: number(given.seconds, `${name}.seconds`, 1 / FPS, 86400),
-    people: number(given.people ?? 1, `${name}.people`, 1, 2),
-    how: word(given.how ?? "drawn", `${name}.how`),
-    ...(given.told == null
+    motion: motionId(entries.motion, `${name}.motion`),
+    seed: number(entries.seed ?? 0, `${name}.seed`, 0, 2 ** 62),
+    seconds: number(entries.seconds, `${name}.seconds`, 1 / FPS, 86400),
+    people: number(entries.people ?? 1, `${name}.people`, 1, 2),
+    how: word(entries.how ?? "drawn", `${name}.how`),
+    ...(entries.told == null
       ? {}
-      : { told: list(given.told, `${name}.told`, 100).map((one) => word(one, `${name}.told`)) }),
-    ...(given.overlaps == null
+      : { told: list(entries.told, `${name}.told`, 100).map((one) => word(one, `${name}.told`)) }),
+    ...(entries.overlaps == null
       ? {}
-      : { overlaps: list(given.overlaps, `${name}.overlaps`, 10_000).map((one) => overlap(one, `${name}.overlaps`)) }),
-    ...(given.tracks == null
+      : {
+          overlaps: list(entries.overlaps, `${name}.overlaps`, 10_000).map((one) => overlap(one, `${name}.overlaps`)),
+        }),
+    ...(entries.tracks == null
       ? {}
-      : { tracks: list(given.tracks, `${name}.tracks`, 400).map((one) => word(one, `${name}.tracks`)) }),
-    ...(given.under == null ? {} : { under: motionId(given.under, `${name}.under`) }),
-    ...(given.notes == null
+      : { tracks: list(entries.tracks, `${name}.tracks`, 400).map((one) => word(one, `${name}.tracks`)) }),
+    ...(entries.under == null ? {} : { under: motionId(entries.under, `${name}.under`) }),
+    ...(entries.notes == null
       ? {}
-      : { notes: list(given.notes, `${name}.notes`, 200).map((one, index) => note(one, `${name}.notes[${index}]`)) }),
+      : { notes: list(entries.notes, `${name}.notes`, 200).map((one, index) => note(one, `${name}.notes[${index}]`)) }),
   };
 }
 
-function overlap(found: unknown, name: string) {
-  const given = mapping(found, name);
-  const [begin, end, depth] = ["begin", "end", "depth"].map((key) => number(given[key], `${name}.${key}`, 0, 86400));
+function overlap(json: unknown, name: string) {
+  const entries = mapping(json, name);
+  const [begin, end, depth] = ["begin", "end", "depth"].map((key) => number(entries[key], `${name}.${key}`, 0, 86400));
   return { begin: begin!, end: end!, depth: depth! };
 }
 
-function note(found: unknown, name: string) {
-  const given = mapping(found, name);
+function note(json: unknown, name: string) {
+  const entries = mapping(json, name);
   return {
-    text: word(given.text, `${name}.text`),
-    line: word(given.line, `${name}.line`),
-    instead: list(given.instead ?? [], `${name}.instead`, 10).map((one) => word(one, `${name}.instead`)),
+    text: word(entries.text, `${name}.text`),
+    line: word(entries.line, `${name}.line`),
+    instead: list(entries.instead ?? [], `${name}.instead`, 10).map((one) => word(one, `${name}.instead`)),
   };
 }
 
-function clip(found: unknown, name: string) {
-  const given = mapping(found, name);
+function clip(json: unknown, name: string) {
+  const given = mapping(json, name);
   return {
     motion: motionId(given.motion, `${name}.motion`),
     name: word(given.name, `${name}.name`),

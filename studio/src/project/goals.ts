@@ -61,11 +61,11 @@ export function goalOf(person: Person, seconds: number): Goal | null {
 function pathGoal(path: Path, seconds: number): PathGoal | null {
   const given = path.given as unknown as Partial<PathGoal> | null | undefined;
   if (given && !(given.times && given.times.at(-1)! > seconds)) return given as PathGoal;
-  const walked = timed(path, seconds);
-  if (!walked) return null;
-  const degrees = facings(walked);
-  const points = walked.points.map(({ x, z }) => [x, z]);
-  return { points, times: [...walked.times], ...(degrees ? { facing: degrees } : {}) };
+  const timedPath = timed(path, seconds);
+  if (!timedPath) return null;
+  const degrees = facings(timedPath);
+  const points = timedPath.points.map(({ x, z }) => [x, z]);
+  return { points, times: [...timedPath.times], ...(degrees ? { facing: degrees } : {}) };
 }
 
 /** The timeline of a project; the words of both people where there are two. */
@@ -80,7 +80,7 @@ export function timelineOf(project: Project, seed = project.seed): TimelineJson 
       return { ...json, ...one.given };
     }),
   };
-  const person = project.people[asked(project)]!;
+  const person = project.people[constraintCount(project)]!;
   const goal = joinedGoals(goalOf(person, length(project)), kept);
   const [first] = timeline.segments;
   // Who has no path begins at the origin facing +Z, and what a first block asks is seen from there: the world.
@@ -97,10 +97,10 @@ export function notesOf(project: Project, one: Segment): readonly Note[] {
 }
 
 /** What is asked of blocks that have no words yet, so that the others can be drawn. */
-export const STANDS = "a person stands still";
+export const STANDS_STILL = "a person stands still";
 
 function wordsOf(project: Project, one: Segment): string {
-  const text = one.text.trim() ? one.text : STANDS;
+  const text = one.text.trim() ? one.text : STANDS_STILL;
   return project.people.length > 1 ? `${text} :: ${one.other.trim() || text}` : text;
 }
 
@@ -112,7 +112,7 @@ function joinedGoals(own: Goal | null, kept: unknown): Goal | null {
 }
 
 /** A duet keeps to the goals of one person: the first who has any. */
-export function asked(project: Project): number {
+export function constraintCount(project: Project): number {
   return Math.max(
     project.people.findIndex((person) => goalOf(person, length(project)) !== null),
     0,

@@ -6,7 +6,7 @@ export interface Entry<T> {
 }
 
 /** What a history keeps of one project: what undo brings back and what redo does, the next of either at the end. */
-export interface Kept<T> {
+export interface StoredHistory<T> {
   readonly past: readonly Entry<T>[];
   readonly future: readonly Entry<T>[];
 }
@@ -40,7 +40,7 @@ export class History<T> {
 
   constructor(
     private present: T,
-    kept: Kept<T> = { past: [], future: [] },
+    kept: StoredHistory<T> = { past: [], future: [] },
   ) {
     this.past = [...kept.past];
     this.future = [...kept.future];
@@ -59,7 +59,7 @@ export class History<T> {
     return this.future.at(-1)?.label ?? null;
   }
 
-  get kept(): Kept<T> {
+  get kept(): StoredHistory<T> {
     return { past: this.past, future: this.future };
   }
 
@@ -95,7 +95,7 @@ export class History<T> {
     } else if (draft) {
       return;
     }
-    this.tell({ label, draft, typed });
+    this.notify({ label, draft, typed });
   }
 
   /** Put something beside the point of undo, such as what was drawn, into the present value. */
@@ -103,7 +103,7 @@ export class History<T> {
     const next = edit(this.present);
     if (next === this.present) return;
     this.present = next;
-    this.tell({ label: "", draft: false, typed: false });
+    this.notify({ label: "", draft: false, typed: false });
   }
 
   /** Take over what was done on another page; undo brings back what was here, however often that page did something. */
@@ -112,13 +112,13 @@ export class History<T> {
     this.merge = FOLLOWED;
     this.future = [];
     this.present = next;
-    this.tell({ label: "", draft: false, typed: false, elsewhere: true });
+    this.notify({ label: "", draft: false, typed: false, elsewhere: true });
   }
 
   /** Begin with another value, which has a history of its own. */
-  begin(value: T, { past, future }: Kept<T>): void {
+  begin(value: T, { past, future }: StoredHistory<T>): void {
     [this.past, this.future, this.present, this.merge] = [[...past], [...future], value, ""];
-    this.tell({ label: "", draft: false, typed: false, elsewhere: true });
+    this.notify({ label: "", draft: false, typed: false, elsewhere: true });
   }
 
   /** Go to the state of that number of `states`. */
@@ -139,7 +139,7 @@ export class History<T> {
 
   private move(from: Entry<T>[], to: Entry<T>[], word: string): boolean {
     const label = this.step(from, to);
-    if (label !== null) this.tell({ label: `${word} ${label}`, draft: false, typed: false });
+    if (label !== null) this.notify({ label: `${word} ${label}`, draft: false, typed: false });
     return label !== null;
   }
 
@@ -152,7 +152,7 @@ export class History<T> {
     return entry.label;
   }
 
-  private tell(change: Change): void {
+  private notify(change: Change): void {
     for (const listener of this.listeners) listener(this.present, change);
   }
 }

@@ -2,7 +2,7 @@
 
 import { type MotionClip, jointAt } from "../body/clip";
 import { LEFT, RIGHT } from "../body/skeleton";
-import { changeTarget, keepWay, putTarget } from "./asks";
+import { changeTarget, pathFromMotion, setTarget } from "./constraints";
 import { FPS, type Project, type Target, type Vec3, toFrame } from "./model";
 import { distance } from "./path";
 
@@ -108,8 +108,8 @@ export function moveMeeting(project: Project, meeting: Meeting, to: Vec3, clip: 
     const sign = who ? 1 : -1;
     const place = to.map((value, axis) => value + sign * half[axis]!) as [number, number, number];
     if (ids) return changeTarget(now, who, ids[who]!, { position: place });
-    const walked = clip && !now.people[who]!.path ? keepWay(now, who, clip) : now;
-    const put = putTarget(walked, who, joints[who]!, time, place);
+    const walked = clip && !now.people[who]!.path ? pathFromMotion(now, who, clip) : now;
+    const put = setTarget(walked, who, joints[who]!, time, place);
     const target = put.people[who]!.targets.find(
       (one) => one.joint === joints[who] && Math.abs(one.time - time) < 0.5 / FPS,
     );

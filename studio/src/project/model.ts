@@ -24,11 +24,11 @@ export interface Segment {
   /** Seconds shared with the next segment; null: one second, or half of the shorter one. */
   readonly transition: number | null;
   /** What a timeline file asks of this stretch and the page does not change: `guidance`, `goal`, `goals`. */
-  readonly given: Given | null;
+  readonly given: GoalJson | null;
 }
 
 /** Keys of a timeline file that are kept as they came and go out again. */
-export type Given = Readonly<Record<string, unknown>>;
+export type GoalJson = Readonly<Record<string, unknown>>;
 
 export interface PathPoint {
   readonly x: number;
@@ -46,7 +46,7 @@ export interface Path {
   /** When each point is reached, for a way that was walked already; null: as `speed` and stops say. */
   readonly times: readonly number[] | null;
   /** The path of a timeline file, as long as nobody has changed it. */
-  readonly given?: Given | null;
+  readonly given?: GoalJson | null;
 }
 
 /** A joint that is asked to be somewhere. */
@@ -180,7 +180,7 @@ export interface Project {
   /** The user's own character, as the server knows it. */
   readonly character: { readonly id: string; readonly name: string } | null;
   /** What a timeline file asks of the whole and the page does not change: `guidance`, `start`, `path`. */
-  readonly given: Given | null;
+  readonly given: GoalJson | null;
 }
 
 let counter = 0;
@@ -191,7 +191,7 @@ export function newId(): string {
   return `${Date.now().toString(36)}${counter.toString(36)}${Math.floor(Math.random() * 1296).toString(36)}`;
 }
 
-export const NOTHING_ASKED: Person = { path: null, targets: [], poses: [], tracks: [] };
+export const NO_CONSTRAINTS: Person = { path: null, targets: [], poses: [], tracks: [] };
 
 export function segment(text: string, seconds: number): Segment {
   return { id: newId(), text, other: "", seconds, transition: null, given: null };
@@ -205,7 +205,7 @@ export function exampleProject(): Project {
     seed: 1,
     count: 1,
     segments: [segment("a person walks forward", 3.5), segment("a person waves with the right hand", 3)],
-    people: [NOTHING_ASKED],
+    people: [NO_CONSTRAINTS],
     frozen: [],
     base: null,
     only: null,

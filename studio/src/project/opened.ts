@@ -6,7 +6,7 @@
 import { JOINTS } from "../body/skeleton";
 import type { Goal, JointGoal, Point } from "./goals";
 import {
-  type Given,
+  type GoalJson,
   type Path,
   type Person,
   type Pose,
@@ -14,7 +14,7 @@ import {
   type Segment,
   type Target,
   type Vec3,
-  NOTHING_ASKED,
+  NO_CONSTRAINTS,
   exampleProject,
   newId,
   round,
@@ -47,7 +47,7 @@ export function opened(found: Mapping, name: string, person = 0): Project {
     name,
     seed: typeof seed === "number" ? seed : 0,
     segments,
-    people: two ? [0, 1].map((who) => (who === person ? asked.person : NOTHING_ASKED)) : [asked.person],
+    people: two ? [0, 1].map((who) => (who === person ? asked.person : NO_CONSTRAINTS)) : [asked.person],
     given: Object.keys(kept).length ? kept : null,
   };
 }
@@ -68,19 +68,19 @@ function segment(row: string | Mapping, shared: unknown): Segment {
 }
 
 /** What a first stretch asks is in the world where it says no start and no path of its own. */
-function goalInWorld(given: Given | null): boolean {
+function goalInWorld(given: GoalJson | null): boolean {
   const goal = given?.goal;
   return typeof goal === "object" && goal !== null && !("path" in goal) && !("start" in goal);
 }
 
 /** The part of a goal that the page shows and changes, and what is left of it. */
 function read(goal: unknown, seconds: number): { person: Person; kept?: unknown } {
-  if (typeof goal !== "object" || goal === null) return { person: NOTHING_ASKED, ...(goal ? { kept: goal } : {}) };
+  if (typeof goal !== "object" || goal === null) return { person: NO_CONSTRAINTS, ...(goal ? { kept: goal } : {}) };
   const { path, joints = [], ...others } = goal as Goal;
   const line = path && pathOf(path as unknown as Mapping);
   const own = joints.filter(isOwn);
   const foreign = joints.filter((one) => !isOwn(one));
-  const person = { ...NOTHING_ASKED, path: line ?? null, ...asks(own, seconds) };
+  const person = { ...NO_CONSTRAINTS, path: line ?? null, ...asks(own, seconds) };
   const kept: Mapping = { ...others };
   if (path && !line) kept.path = path;
   if (foreign.length) kept.joints = foreign;
@@ -151,7 +151,7 @@ function vec3([x, y, z]: number[]): Vec3 {
   return [x!, y!, z!];
 }
 
-function rest(given: Given, without: string): Given | null {
+function rest(given: GoalJson, without: string): GoalJson | null {
   const left = Object.fromEntries(Object.entries(given).filter(([key]) => key !== without));
   return Object.keys(left).length ? left : null;
 }

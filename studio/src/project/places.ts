@@ -1,7 +1,7 @@
 /** Where on the page a sentence of the server belongs: the block, path, target or pose that caused it. */
 
 import { JOINTS, jointName } from "../body/skeleton";
-import { type TimelineJson, asked, timelineOf } from "./goals";
+import { type TimelineJson, constraintCount, timelineOf } from "./goals";
 import type { Project, Target } from "./model";
 
 export type Place =
@@ -60,7 +60,7 @@ function atGoal(project: Project, where: string): Place | null {
 }
 
 function askAt(project: Project, joint: number, time: number): Place | null {
-  const who = asked(project);
+  const who = constraintCount(project);
   const { targets, poses } = project.people[who]!;
   const covers = (one: Target) =>
     one.joint === joint && one.time - 0.06 < time && time < (one.until ?? one.time) + 0.06;
@@ -71,6 +71,6 @@ function askAt(project: Project, joint: number, time: number): Place | null {
 }
 
 function pathPlace(project: Project): Place | null {
-  const who = asked(project);
+  const who = constraintCount(project);
   return project.people[who]!.path || project.given?.path ? { kind: "path", who } : null;
 }

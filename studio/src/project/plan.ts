@@ -1,9 +1,9 @@
 /** Which jobs of the server make a project's motion. */
 
 import { type Project, type Range, type Take, begins, length } from "./model";
-import { STANDS, type TimelineJson, asked, goalOf, timelineOf } from "./goals";
+import { STANDS_STILL, type TimelineJson, constraintCount, goalOf, timelineOf } from "./goals";
 import { trackJobs } from "./tracks";
-import { needsWay } from "./asks";
+import { personWithoutPath } from "./constraints";
 import type { Place, Problem } from "./places";
 import { between } from "./timeline";
 import type { ComposeRequest, DuetRequest, EditRequest, Goals } from "../server/types";
@@ -21,7 +21,7 @@ export function plan(project: Project): Plan {
     const at: Place = { kind: "segment", id: project.segments[0]!.id };
     return { jobs: [], missing: { message: "No block has words yet; say what the person does.", at } };
   }
-  const who = needsWay(project);
+  const who = personWithoutPath(project);
   if (who >= 0) {
     const message = "Joints and poses over several blocks need the person's way; draw a path (P).";
     return { jobs: [], missing: { message, at: { kind: "path", who } } };
@@ -38,14 +38,14 @@ export function planKey(project: Project): string {
 }
 
 /** Whether the takes are what the project asks for. */
-export function isDrawn(project: Project): boolean {
+export function isUpToDate(project: Project): boolean {
   return project.drawn === planKey(project);
 }
 
 /** Blocks whose motion on the stage was drawn from other words, by their ids. */
 export function stale(project: Project): ReadonlySet<string> {
   const { segments, base, frozen, drawn } = project;
-  if (!project.takes.length || isDrawn(project)) return new Set();
+  if (!project.takes.length || isUpToDate(project)) return new Set();
   if (base) {
     const at = begins(segments);
     const free = between(frozen, length(project));
@@ -72,7 +72,7 @@ function redraw(project: Project, base: Take): Plan {
   const jobs: UnfinishedEdit[] = [];
   const free = between(project.frozen, Math.min(base.seconds, length(project)));
   for (const [from, to] of free) {
-    for (const person of redrawn(project)) {
+    for (const person of changedBlocks(project)) {
       project.segments.forEach((one, index) => {
         const range: Range = [Math.max(from, at[index]!), Math.min(to, at[index + 1]!)];
         const prompt = (person === 1 && one.other.trim()) || one.text.trim();
@@ -91,7 +91,7 @@ function redraw(project: Project, base: Take): Plan {
 }
 
 /** Who of the take is drawn anew. */
-function redrawn({ base, only }: Project): number[] {
+function changedBlocks({ base, only }: Project): number[] {
   const people = base?.people ?? 1;
   return only !== null && only < people ? [only] : Array.from({ length: people }, (_, person) => person);
 }
@@ -100,10 +100,10 @@ function redrawn({ base, only }: Project): number[] {
 function duet(project: Project): Job {
   const { seed, count, reactTo } = project;
   if (reactTo) {
-    const prompt = project.segments.map((one) => one.other.trim() || one.text.trim() || STANDS).join(", then ");
+    const prompt = project.segments.map((one) => one.other.trim() || one.text.trim() || STANDS_STILL).join(", then ");
     return { task: "duet", react_to: reactTo.motion, prompt, seed, count };
   }
-  const person = asked(project);
+  const person = constraintCount(project);
   const goals = goalOf(project.people[person]!, length(project));
   const timeline = timelineOf(project);
   const other = goalOf(project.people[1 - person]!, length(project));

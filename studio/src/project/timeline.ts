@@ -7,7 +7,7 @@ import {
   type Segment,
   FPS,
   LONGEST,
-  NOTHING_ASKED,
+  NO_CONSTRAINTS,
   SHORTEST,
   begins,
   clamp,
@@ -247,6 +247,6 @@ export function changePerson(project: Project, index: number, edit: (person: Per
 
 export function setPeople(project: Project, count: 1 | 2): Project {
   if (project.people.length === count) return project;
-  const people = count === 2 ? [...project.people, NOTHING_ASKED] : project.people.slice(0, 1);
+  const people = count === 2 ? [...project.people, NO_CONSTRAINTS] : project.people.slice(0, 1);
   return unfrozen({ ...project, people, reactTo: count === 1 ? null : project.reactTo });
 }

@@ -72,7 +72,7 @@ export function trackOf(project: Project, who: number, id: string): Track | unde
 /** What a take was drawn with, of everybody's tracks: it says whether a track is in its frames already. */
 export function trackKeys(project: Project): string[] {
   return project.people.flatMap((person, who) =>
-    person.tracks.filter((one) => asked(project, who, one)).map((one) => trackKey(who, one)),
+    person.tracks.filter((one) => editRequest(project, who, one)).map((one) => trackKey(who, one)),
   );
 }
 
@@ -81,7 +81,7 @@ export function trackKey(who: number, { part, text, clip, look, smooth, from, un
 }
 
 /** What the part is to do, in a word or two; empty: nothing yet. */
-export function trackSaid({ part, text, clip, look, smooth }: Track): string {
+export function trackText({ part, text, clip, look, smooth }: Track): string {
   if (smooth) return `smoothed, ${smooth} s`;
   if (clip) return clip.name;
   if (part !== "head" || !look) return text.trim();
@@ -89,7 +89,11 @@ export function trackSaid({ part, text, clip, look, smooth }: Track): string {
 }
 
 /** What an edit says of it; null: nothing is asked. */
-function asked(project: Project, who: number, { part, text, clip, look, smooth }: Track): Partial<EditRequest> | null {
+function editRequest(
+  project: Project,
+  who: number,
+  { part, text, clip, look, smooth }: Track,
+): Partial<EditRequest> | null {
   const { keep } = PARTS[part];
   if (smooth) return { smooth, keep };
   if (clip) return { source: clip.motion, keep };
@@ -110,7 +114,7 @@ export function trackJobs(
   const there = new Set(free && project.base?.tracks);
   return project.people.flatMap((person, who) =>
     person.tracks.flatMap((one) => {
-      const doing = asked(project, who, one);
+      const doing = editRequest(project, who, one);
       const spans = there.has(trackKey(who, one)) ? free! : [[0, seconds] as const];
       const between = spans
         .map(([from, to]): Range => [Math.max(from, one.from), Math.min(to, one.until, seconds)])

@@ -14,7 +14,7 @@ export interface Result {
   readonly frames: number;
   readonly people: number;
   /** What each person did, as it was measured. */
-  readonly happened?: Happened;
+  readonly happened?: Events;
   readonly remarks?: readonly string[];
   /** `redrawn`: the blocks that were drawn, where the others were kept of an older motion. */
   readonly measures?: { readonly redrawn?: readonly number[]; readonly overlaps?: readonly Overlap[] };
@@ -24,7 +24,7 @@ export interface Result {
   readonly under?: string;
 }
 
-type Happened = readonly ({ readonly sentence: string } | null)[];
+type Events = readonly ({ readonly sentence: string } | null)[];
 
 export interface JobState {
   readonly id: string;
@@ -184,7 +184,7 @@ export function takeOf(result: Result, how: string): Take {
   return { motion: id, seed, seconds, people, how, told: [...sentences(happened), ...others], notes, overlaps };
 }
 
-function sentences(happened: Happened): string[] {
+function sentences(happened: Events): string[] {
   const said = happened.map((one, who) => one && `${happened.length > 1 ? `Person ${who + 1} ` : ""}${one.sentence}`);
   return said.filter((one) => one !== null);
 }
@@ -196,7 +196,7 @@ export function deeds(motion: string, begin: number, end: number): Promise<strin
   const path = `motions/${encodeURIComponent(motion)}/deeds?begin=${begin}&end=${end}`;
   const known = measured.get(path);
   if (known) return known;
-  const asked = getJson<{ happened: Happened }>(path).then(({ happened }) => sentences(happened));
+  const asked = getJson<{ happened: Events }>(path).then(({ happened }) => sentences(happened));
   measured.set(path, asked);
   asked.catch(() => measured.delete(path));
   if (measured.size > 500) measured.delete(measured.keys().next().value!);

@@ -1,8 +1,8 @@
-/** A film of pictures that the page draws: sent one after the other, encoded by the server as they come. */
+/** A film of pictures of the page: sent one after the other, encoded by the server as they arrive. */
 
 import { Refused, Unreachable, webSocketAddress } from "./http";
 
-export interface FilmAsked {
+export interface FilmFormat {
   readonly format: "mp4" | "gif";
   readonly width: number;
   readonly height: number;
@@ -14,14 +14,14 @@ export interface FilmAsked {
 const PIECE = 1 << 17;
 
 /**
- * The film of `count` pictures; `picture` draws the n-th, `seen` hears how many are done.
+ * The film of `count` pictures; `picture` draws the n-th, `progress` is called with how many are done.
  *
  * Nothing is left of it anywhere if `signal` is aborted. Raises `Refused` with the server's sentence, and `Unreachable`.
  */
 export function writeFilm(
-  asked: FilmAsked,
+  format: FilmFormat,
   picture: (number: number) => Promise<Blob>,
-  seen: (done: number) => void,
+  progress: (done: number) => void,
   signal: AbortSignal,
 ): Promise<Blob> {
   const socket = new WebSocket(webSocketAddress("film"));
@@ -29,27 +29,27 @@ export function writeFilm(
   let missing = Infinity;
   let over = false;
   const parts: Blob[] = [];
-  const heard = async (said: { done?: number; size?: number; error?: string }) => {
-    if (said.error !== undefined) throw new Refused(said.error, 400);
-    if (said.size !== undefined) missing = said.size;
-    if (said.done === undefined) return;
-    seen(said.done);
-    const drawn = await (next ?? picture(0));
+  const receive = async (message: { done?: number; size?: number; error?: string }) => {
+    if (message.error !== undefined) throw new Refused(message.error, 400);
+    if (message.size !== undefined) missing = message.size;
+    if (message.done === undefined) return;
+    progress(message.done);
+    const blob = await (next ?? picture(0));
     if (over) return;
-    send(socket, drawn);
-    // The next one is drawn while this one is encoded.
-    next = said.done + 1 < asked.count ? picture(said.done + 1) : null;
+    send(socket, blob);
+    // The next one is rendered while this one is encoded.
+    next = message.done + 1 < format.count ? picture(message.done + 1) : null;
     next?.catch(() => undefined);
   };
   return new Promise<Blob>((done, fail) => {
     signal.addEventListener("abort", () => fail(signal.reason));
-    socket.addEventListener("open", () => socket.send(JSON.stringify(asked)));
+    socket.addEventListener("open", () => socket.send(JSON.stringify(format)));
     socket.addEventListener("close", () => fail(new Unreachable()));
     socket.addEventListener("message", ({ data }: MessageEvent<string | Blob>) => {
-      if (typeof data === "string") return void heard(JSON.parse(data) as object).catch(fail);
+      if (typeof data === "string") return void receive(JSON.parse(data) as object).catch(fail);
       parts.push(data);
       missing -= data.size;
-      if (missing <= 0) done(new Blob(parts, { type: asked.format === "gif" ? "image/gif" : "video/mp4" }));
+      if (missing <= 0) done(new Blob(parts, { type: format.format === "gif" ? "image/gif" : "video/mp4" }));
     });
   }).finally(() => {
     over = true;

@@ -15,7 +15,7 @@ export interface Actor {
   readonly seconds: number;
 }
 
-export function parsed(data: ArrayBuffer): Promise<GLTF> {
+export function parseGltf(data: ArrayBuffer): Promise<GLTF> {
   return new GLTFLoader(inside).parseAsync(data, "");
 }
 
@@ -30,7 +30,7 @@ export function actorOf(root: THREE.Object3D, animations: readonly THREE.Animati
 }
 
 /** Everybody where they are at a time, or hidden. */
-export function placed(actors: readonly Actor[], time: number, isShown: boolean): void {
+export function setTime(actors: readonly Actor[], time: number, isShown: boolean): void {
   for (const { root, mixer, seconds } of actors) {
     root.visible = isShown;
     if (isShown) mixer.setTime(Math.min(time, seconds - 1e-3));

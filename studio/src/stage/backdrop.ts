@@ -14,7 +14,7 @@ const KEPT = "motionloom-backdrop";
 /** Bytes of a file that is read; pixels of its longer side, and characters as it is kept. */
 const [MOST_BYTES, MOST_PIXELS, MOST_KEPT] = [30e6, 1920, 2e6];
 
-export function keptBackdrop(): Backdrop {
+export function storedBackdrop(): Backdrop {
   try {
     const { color, picture } = JSON.parse(localStorage.getItem(KEPT) ?? "{}") as Record<string, unknown>;
     return {
@@ -27,7 +27,7 @@ export function keptBackdrop(): Backdrop {
 }
 
 /** Keep it in this browser; raises `Error` with a sentence where there is no room. */
-export function keepBackdrop(backdrop: Backdrop): void {
+export function storeBackdrop(backdrop: Backdrop): void {
   try {
     localStorage.setItem(KEPT, JSON.stringify(backdrop));
   } catch {

@@ -3,7 +3,7 @@
 import { type App, problemOf } from "../app/app";
 import { keptTake } from "../project/model";
 import { bytes, motionFile } from "../server/api";
-import { type Actor, actorOf, placed } from "./actor";
+import { type Actor, actorOf, setTime } from "./actor";
 import { unpackedFile } from "./packed";
 import type { Scene } from "./scene";
 
@@ -29,7 +29,7 @@ export class Character {
 
   /** Put the character where it is at a time, or hide it; false: it is not to be seen. */
   at(time: number, isShown: boolean): boolean {
-    placed(this.actors, time, isShown);
+    setTime(this.actors, time, isShown);
     return isShown && this.actors.length > 0;
   }
 

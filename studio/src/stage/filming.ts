@@ -6,7 +6,7 @@ import { NOTHING, type Session } from "../app/session";
 import { jointAt } from "../body/clip";
 import { PELVIS } from "../body/skeleton";
 import { clamp } from "../project/model";
-import type { FilmAsked } from "../server/film";
+import type { FilmFormat } from "../server/film";
 import type { Scene } from "./scene";
 
 /** How the camera goes: as somebody set it, or once around the people. */
@@ -30,7 +30,7 @@ export class Filming {
   constructor(
     private readonly app: App,
     private readonly scene: Scene,
-    private readonly asked: FilmAsked,
+    private readonly asked: FilmFormat,
     private readonly way: Way,
   ) {
     this.begin = stretch(app)[0];

@@ -50,8 +50,8 @@ export class GazeTool {
   }
 
   /** Where the point is on the screen, for scripts. */
-  tell(): void {
-    this.scene.tell("gaze", this.gizmo.enabled ? this.scene.onScreen(this.point.position) : null);
+  reportPositions(): void {
+    this.scene.report("gaze", this.gizmo.enabled ? this.scene.onScreen(this.point.position) : null);
   }
 
   private place(): Vec3 | null {

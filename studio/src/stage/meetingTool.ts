@@ -54,10 +54,10 @@ export class MeetingTool {
   }
 
   /** Turn the rings to the camera, and say where the one of now is on the screen. */
-  tell(): void {
+  reportPositions(): void {
     for (const one of this.group.children) one.quaternion.copy(this.scene.camera.quaternion);
     const now = this.now();
-    this.scene.tell("meeting", now && this.scene.onScreen(new THREE.Vector3(...middle(now))));
+    this.scene.report("meeting", now && this.scene.onScreen(new THREE.Vector3(...middle(now))));
   }
 
   /** Go to the next meeting behind the playhead, or the first one. */

@@ -18,16 +18,16 @@ export async function unpackedFile(data: ArrayBuffer, name: string): Promise<GLT
   if (used.has("EXT_meshopt_compression") || used.has("KHR_meshopt_compression")) {
     loader.setMeshoptDecoder(MeshoptDecoder);
   }
-  if (!used.has("KHR_draco_mesh_compression")) return parsed(loader, data, name);
+  if (!used.has("KHR_draco_mesh_compression")) return parseFile(loader, data, name);
   const draco = new DRACOLoader().setDecoderPath(DRACO_GLTF_CONFIG);
   try {
-    return await parsed(loader.setDRACOLoader(draco), data, name);
+    return await parseFile(loader.setDRACOLoader(draco), data, name);
   } finally {
     draco.dispose();
   }
 }
 
-async function parsed(loader: GLTFLoader, data: ArrayBuffer, name: string): Promise<GLTF> {
+async function parseFile(loader: GLTFLoader, data: ArrayBuffer, name: string): Promise<GLTF> {
   try {
     return await loader.parseAsync(data, "");
   } catch (error) {

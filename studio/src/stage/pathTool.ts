@@ -4,7 +4,7 @@ import * as THREE from "three";
 import { type App, shownClip } from "../app/app";
 import { NOTHING } from "../app/session";
 import { jointAt } from "../body/clip";
-import { addPoint, changePoint, drawPath } from "../project/asks";
+import { addPoint, changePoint, drawPath } from "../project/constraints";
 import { type PathPoint, length, newId, round } from "../project/model";
 import { type Ground, along, apart, curve, direction, placeAt, timed } from "../project/path";
 import { Line } from "./lines";
@@ -70,12 +70,12 @@ export class PathTool {
   }
 
   /** Where the path's end and the chosen point's facing handle are on the screen, for scripts. */
-  tell(): void {
+  reportPositions(): void {
     const { selection, person } = this.app.session.value;
     const points = this.app.project.value.people[person]?.path?.points ?? [];
     const chosen = selection.kind === "point" && points[selection.index] ? selection.index : -1;
-    this.scene.tell("pathEnd", points.at(-1) ? this.onScreen(points.at(-1)!) : null);
-    this.scene.tell("facing", chosen >= 0 ? this.onScreen(tip(points, chosen)) : null);
+    this.scene.report("pathEnd", points.at(-1) ? this.onScreen(points.at(-1)!) : null);
+    this.scene.report("facing", chosen >= 0 ? this.onScreen(tip(points, chosen)) : null);
   }
 
   /** Show where on the path the person should be. */
@@ -147,7 +147,7 @@ export class PathTool {
   }
 
   /** A point where the keyboard's cursor is. */
-  put(): void {
+  placePoint(): void {
     const at = this.keyboard;
     if (!at) return this.nudge(0, 0.5);
     const who = this.app.session.value.person;

@@ -185,7 +185,7 @@ export class Scene {
   }
 
   /** Say in the page where something is on the screen; null: it is not there. */
-  tell(name: string, at: readonly number[] | null): void {
+  report(name: string, at: readonly number[] | null): void {
     if (at) this.canvas.dataset[name] = at.map(Math.round).slice(0, 2).join();
     else delete this.canvas.dataset[name];
   }

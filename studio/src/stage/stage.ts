@@ -10,7 +10,7 @@ import { Character } from "./character";
 import { FOLLOWING } from "./filming";
 import { MeetingTool } from "./meetingTool";
 import { PathTool, ring } from "./pathTool";
-import { Said } from "./said";
+import { HeadLabels } from "./labels";
 import { Scene } from "./scene";
 import { Steps } from "./steps";
 import { TargetTool } from "./targetTool";
@@ -60,13 +60,13 @@ export class Stage {
     this.scene.scene.add(this.goal);
     this.scene.busy = () => app.session.value.drawing !== null || app.session.value.pending;
     this.scene.step = (elapsed) => this.step(elapsed);
-    const said = new Said(app, this.scene);
+    const said = new HeadLabels(app, this.scene);
     this.scene.painted = () => {
-      this.gaze.tell();
-      this.path.tell();
-      this.targets.tell();
-      this.meetings.tell();
-      said.tell();
+      this.gaze.reportPositions();
+      this.path.reportPositions();
+      this.targets.reportPositions();
+      this.meetings.reportPositions();
+      said.update();
     };
     this.listen(canvas);
     app.project.subscribe(() => this.update());

@@ -7,7 +7,7 @@ import { POSE, poseAt, vec } from "../body/clip";
 import { moved } from "../body/posed";
 import { reach } from "../body/reach";
 import { TARGETS } from "../body/skeleton";
-import { changePose, poseNear, putTarget, targetAt } from "../project/asks";
+import { changePose, poseNear, setTarget, targetAt } from "../project/constraints";
 import { isMeasurable, isUnmet } from "../project/misses";
 import { type Pose, type Vec3, newId, toFrame } from "../project/model";
 import type { Cast } from "./cast";
@@ -109,11 +109,11 @@ export class TargetTool {
   }
 
   /** Where the gizmo and the joints are on the screen, for scripts. */
-  tell(): void {
+  reportPositions(): void {
     this.dots.forEach((dot, index) =>
-      this.scene.tell(`joint-${TARGETS[index]!}`, this.isOn() ? this.scene.onScreen(dot.position) : null),
+      this.scene.report(`joint-${TARGETS[index]!}`, this.isOn() ? this.scene.onScreen(dot.position) : null),
     );
-    this.scene.tell("gizmo", this.isOn() ? this.scene.onScreen(this.proxy.position) : null);
+    this.scene.report("gizmo", this.isOn() ? this.scene.onScreen(this.proxy.position) : null);
   }
 
   /** `more`: of a pose, a joint more that moves with the others, or one less. */
@@ -184,7 +184,7 @@ export class TargetTool {
     if (own) return this.move(own, position, draft);
     const at = toFrame(time);
     const id = newId();
-    this.app.project.change("ask for a joint", (old) => putTarget(old, person, joint, at, position, id), {
+    this.app.project.change("ask for a joint", (old) => setTarget(old, person, joint, at, position, id), {
       merge: this.dragging,
       draft,
     });

@@ -4,9 +4,9 @@ import { Signal } from "../app/signal";
 import { type MotionClip, motionClip } from "../body/clip";
 import type { Body } from "../prior/person";
 import type { Project } from "./link";
-import type { About, Draw, Said, Stop } from "./messages";
+import type { About, Draw, WorkerMessage, Stop } from "./messages";
 
-export interface Drawn {
+export interface Generated {
   readonly project: Project;
   readonly bodies: readonly Body[];
   readonly clips: readonly MotionClip[];
@@ -27,7 +27,7 @@ export interface State {
   readonly error: string;
   /** What is guessed while it is drawn. */
   readonly sketch: readonly MotionClip[];
-  readonly drawn: Drawn | null;
+  readonly drawn: Generated | null;
 }
 
 const FPS = 20;
@@ -49,7 +49,7 @@ export class Artist {
   private id = 0;
 
   constructor() {
-    this.worker.onmessage = ({ data }: MessageEvent<Said>) => this.hear(data);
+    this.worker.onmessage = ({ data }: MessageEvent<WorkerMessage>) => this.receive(data);
     this.worker.onerror = () => this.fail("the part of the page that draws does not start; load the page again");
     this.worker.postMessage(document.baseURI.split("#")[0]);
   }
@@ -72,15 +72,15 @@ export class Artist {
     if (this.state.value.about) this.state.update({ progress: null, says: "stopped", sketch: [] });
   }
 
-  private hear(said: Said): void {
-    if (said.kind === "loading") {
-      const [done, of] = [said.done / 1e6, said.of / 1e6];
+  private receive(message: WorkerMessage): void {
+    if (message.kind === "loading") {
+      const [done, of] = [message.done / 1e6, message.of / 1e6];
       this.state.update({
         progress: done / of,
         says: `loading the weights: ${done.toFixed(0)} of ${of.toFixed(0)} MB`,
       });
-    } else if (said.kind === "ready") {
-      const { about, threads, graphics, remark } = said;
+    } else if (message.kind === "ready") {
+      const { about, threads, graphics, remark } = message;
       this.state.update({
         about,
         threads,
@@ -88,21 +88,21 @@ export class Artist {
         remark,
         ...(this.asked ? { progress: 0, says: "drawing" } : { progress: null, says: "" }),
       });
-    } else if (said.id !== null && said.id !== this.id) return;
-    else if (said.kind === "failed") this.fail(said.message);
-    else if (said.kind === "sketch") {
-      const sketch = said.takes.map((places) => motionClip(FPS, [places]));
+    } else if (message.id !== null && message.id !== this.id) return;
+    else if (message.kind === "failed") this.fail(message.message);
+    else if (message.kind === "sketch") {
+      const sketch = message.takes.map((places) => motionClip(FPS, [places]));
       if (sketch.length && !this.state.value.sketch.length) performance.mark("preview");
-      this.state.update({ progress: said.done / said.of, ...(sketch.length ? { sketch } : {}) });
+      this.state.update({ progress: message.done / message.of, ...(sketch.length ? { sketch } : {}) });
     } else {
-      const clips = said.takes.map((places) => motionClip(FPS, [places]));
+      const clips = message.takes.map((places) => motionClip(FPS, [places]));
       performance.mark("drawn");
       const project = { ...this.asked!, weights: this.state.value.about!.weights };
       this.state.update({
         progress: null,
         says: "",
         sketch: [],
-        drawn: { project, bodies: said.bodies, clips, misses: said.misses },
+        drawn: { project, bodies: message.bodies, clips, misses: message.misses },
       });
     }
   }

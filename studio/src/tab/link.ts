@@ -44,18 +44,19 @@ export function toAddress({ segments, literal, seed, takes, path, weights }: Pro
 /** Null where nothing is behind the #; an Error says in a sentence why a link cannot be opened. */
 export function ofAddress(hash: string): Project | null {
   if (hash.length < 2) return null;
-  const said = new URLSearchParams(hash.slice(1));
+  const parameters = new URLSearchParams(hash.slice(1));
   const refuse = (what: string): never => {
     throw new Error(`This link cannot be opened: ${what}; ask for it again, or write your own words.`);
   };
-  if (said.get("v") !== "1") refuse(`its version is ${JSON.stringify((said.get("v") ?? "none").slice(0, 20))}, not 1`);
+  if (parameters.get("v") !== "1")
+    refuse(`its version is ${JSON.stringify((parameters.get("v") ?? "none").slice(0, 20))}, not 1`);
   const whole = (name: string, low: number, high: number): number => {
-    const text = said.get(name) ?? "";
+    const text = parameters.get(name) ?? "";
     if (!/^\d{1,13}$/.test(text) || Number(text) < low || Number(text) > high)
       refuse(`${name} is ${JSON.stringify(text.slice(0, 20))}, not a whole number from ${low} to ${high}`);
     return Number(text);
   };
-  const segments = said.getAll("s").map((one) => {
+  const segments = parameters.getAll("s").map((one) => {
     const [, number, text] = /^(\d{1,2}(?:\.\d{1,2})?) ([^]*)$/.exec(one) ?? refuse("a sentence in it has no length");
     const seconds = Number(number);
     if (seconds < SHORTEST || seconds > LONGEST) refuse(`a length is ${seconds} s, not ${SHORTEST} to ${LONGEST} s`);
@@ -66,9 +67,9 @@ export function ofAddress(hash: string): Project | null {
   if (segments.length < 1 || segments.length > MOST) refuse(`it has ${segments.length} sentences, not 1 to ${MOST}`);
   if (segments.length > 1 && segments.some((one) => one.seconds < SHORTEST_OF_SEVERAL))
     refuse(`one of several sentences is shorter than ${SHORTEST_OF_SEVERAL} s`);
-  const weights = said.get("w") ?? "";
+  const weights = parameters.get("w") ?? "";
   if (!/^[0-9a-f]{0,64}$/.test(weights)) refuse("it names no weights");
-  const path = (said.get("p") ?? "")
+  const path = (parameters.get("p") ?? "")
     .split(" ")
     .filter(Boolean)
     .map((point): Place => {
@@ -81,6 +82,6 @@ export function ofAddress(hash: string): Project | null {
     });
   if (path.length === 1 || path.length > MOST_POINTS)
     refuse(`its path has ${path.length} points, not 2 to ${MOST_POINTS}`);
-  const literal = !said.has("n") || whole("n", 0, 1) === 0;
+  const literal = !parameters.has("n") || whole("n", 0, 1) === 0;
   return { segments, literal, seed: whole("seed", 0, LARGEST), takes: whole("takes", 1, 4), path, weights };
 }

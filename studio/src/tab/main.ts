@@ -27,7 +27,7 @@ import {
   toAddress,
 } from "./link";
 import { chosenFile, onDrop } from "./files";
-import { readings, secondsSaid } from "./numbers";
+import { readings, secondsInText } from "./numbers";
 import { Player } from "./player";
 
 const THEME = "motionloom-theme";
@@ -60,7 +60,7 @@ class Page {
     this.artist.state.subscribe((now, before) => {
       this.player.working = now.progress !== null;
       if (now.sketch.length) this.player.show(now.sketch);
-      else if (now.drawn && now.drawn !== before.drawn) this.drawn();
+      else if (now.drawn && now.drawn !== before.drawn) this.showMotion();
       else if (before.sketch.length) this.player.show(now.drawn?.clips ?? [], now.drawn?.bodies);
       this.show();
     });
@@ -96,7 +96,7 @@ class Page {
     this.artist.draw(this.project.value);
   }
 
-  private drawn(): void {
+  private showMotion(): void {
     const { project, clips, bodies } = this.artist.state.value.drawn!;
     const old = this.project.value.weights;
     if (old && !project.weights.startsWith(old))
@@ -201,9 +201,9 @@ class Page {
     const name = `Sentence ${index + 1}`;
     const change = (event: Event): void => {
       const next = (event.target as HTMLTextAreaElement).value;
-      const said = this.project.value.literal ? null : secondsSaid(next);
+      const seconds = this.project.value.literal ? null : secondsInText(next);
       const least = this.project.value.segments.length > 1 ? SHORTEST_OF_SEVERAL : SHORTEST;
-      const length = said !== null && said !== secondsSaid(text) ? { seconds: Math.max(said, least) } : {};
+      const length = seconds !== null && seconds !== secondsInText(text) ? { seconds: Math.max(seconds, least) } : {};
       this.segment(index, { text: next, ...length });
     };
     const send = (event: KeyboardEvent): void => {
@@ -239,9 +239,9 @@ class Page {
       pressed: !literal,
       title: "Keep to the numbers in the words, or leave them to the network",
     });
-    const said = `${literal ? "Left to the network" : "Read as"}: ${found.kept.join("; ")}`;
+    const summary = `${literal ? "Left to the network" : "Read as"}: ${found.kept.join("; ")}`;
     return [
-      ...(found.kept.length ? [h("div", { class: "line" }, h("span", { class: "quiet grow" }, said), button)] : []),
+      ...(found.kept.length ? [h("div", { class: "line" }, h("span", { class: "quiet grow" }, summary), button)] : []),
       ...found.left.map((one) => h("p", { class: "quiet" }, one)),
     ];
   }
@@ -387,8 +387,8 @@ function number(
 ): HTMLElement {
   const changed = (event: Event): void => {
     const field = event.target as HTMLInputElement;
-    const said = field.value === "" ? NaN : Number(field.value);
-    const next = Number.isFinite(said) ? Math.min(Math.max(said, min), max) : value;
+    const typed = field.value === "" ? NaN : Number(field.value);
+    const next = Number.isFinite(typed) ? Math.min(Math.max(typed, min), max) : value;
     field.value = String(next);
     change(next);
   };

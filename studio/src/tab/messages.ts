@@ -27,7 +27,7 @@ export interface About {
   readonly data: string;
 }
 
-export type Said =
+export type WorkerMessage =
   | { readonly kind: "loading"; readonly done: number; readonly of: number }
   | {
       readonly kind: "ready";

@@ -1,7 +1,7 @@
 /** Numbers in the words, as the page tells what it reads of them. */
 
 import type { Segment } from "../prior/prior";
-import { reading } from "../prior/wanted";
+import { reading } from "../prior/amounts";
 import { described } from "../prior/words";
 import { LONGEST } from "./link";
 
@@ -13,7 +13,7 @@ const OFTEN = /\b(?:twice|thrice|(?:two|three|four|five|six|seven|eight|nine|ten
 const TURN = /\b(?:half|quarter|full)[ -](?:turn|circle)\b/i;
 
 /** How long the words of a sentence say it takes; null where they say nothing of it. */
-export const secondsSaid = (text: string): number | null => reading(text, FPS, LONGEST).seconds;
+export const secondsInText = (text: string): number | null => reading(text, FPS, LONGEST).seconds;
 
 /** What is kept of the numbers in sentences, and a remark for each that is left to the network. */
 export function readings(segments: readonly Segment[], onPath: boolean): { kept: string[]; left: string[] } {

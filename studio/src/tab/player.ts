@@ -6,7 +6,7 @@ import type { Place } from "../prior/path";
 import { type MotionClip, jointAt } from "../body/clip";
 import { icon } from "../panels/icons";
 import type { Body } from "../prior/person";
-import { type Actor, placed } from "../stage/actor";
+import { type Actor, setTime } from "../stage/actor";
 import { Cast } from "../stage/cast";
 import { Scene } from "../stage/scene";
 import { DARK, GHOSTS, LIGHT } from "../stage/theme";
@@ -132,7 +132,7 @@ export class Player {
     const { clip, time } = this;
     const actor = this.acting();
     this.cast.show(clip, time, actor !== null);
-    if (actor) placed([actor], time, true);
+    if (actor) setTime([actor], time, true);
     const others = this.compare.value ? this.clips.filter((one) => one !== clip) : [];
     this.cast.showGhosts(
       others.map((one, n) => ({ clip: one, color: GHOSTS[n]! })),

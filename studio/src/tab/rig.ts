@@ -59,9 +59,9 @@ export function rigOf(content: Content, bind: ReadonlyMap<number, Pose>): Rig {
   );
   const missing = NEEDED.filter((part) => !parts.has(part));
   if (missing.length) {
-    const said = missing.slice(0, 3).map((part) => part.replace("_", " "));
+    const listing = missing.slice(0, 3).map((part) => part.replace("_", " "));
     throw new Error(
-      `its skeleton has no ${said.join(", ")}${missing.length > 3 ? ` and ${missing.length - 3} more` : ""} by name; use a VRM or names as Mixamo has them`,
+      `its skeleton has no ${listing.join(", ")}${missing.length > 3 ? ` and ${missing.length - 3} more` : ""} by name; use a VRM or names as Mixamo has them`,
     );
   }
   const rest = standing(bones, order, bind);
@@ -105,11 +105,11 @@ function topOf(
 
 function partsOf(content: Content, names: readonly (readonly [number, string])[]): Map<string, number> {
   const { VRM, VRMC_vrm } = (content.extensions ?? {}) as Record<string, { humanoid?: { humanBones?: unknown } }>;
-  const said = VRMC_vrm?.humanoid?.humanBones ?? VRM?.humanoid?.humanBones;
-  if (!said || typeof said !== "object") return partsByName(names);
-  const listed: [string, unknown][] = Array.isArray(said)
-    ? (said as { bone: string; node: number }[]).map(({ bone, node }) => [bone, node])
-    : Object.entries(said as Record<string, { node?: number }>).map(([bone, one]) => [bone, one?.node]);
+  const bones = VRMC_vrm?.humanoid?.humanBones ?? VRM?.humanoid?.humanBones;
+  if (!bones || typeof bones !== "object") return partsByName(names);
+  const listed: [string, unknown][] = Array.isArray(bones)
+    ? (bones as { bone: string; node: number }[]).map(({ bone, node }) => [bone, node])
+    : Object.entries(bones as Record<string, { node?: number }>).map(([bone, one]) => [bone, one?.node]);
   const parts = new Map<string, number>();
   for (const [bone, node] of listed) {
     const part = ofVrm(String(bone));

@@ -6,11 +6,11 @@ import { type Viewer, spoken } from "../prior/spoken";
 import { type Manifest, Packed } from "../prior/weights";
 import { type Graphics, hasGraphics, runtime, threads } from "./device";
 import { LONGEST } from "./link";
-import type { Draw, Said, Stop } from "./messages";
+import type { Draw, WorkerMessage, Stop } from "./messages";
 
 const CACHE = "motionloom-weights";
 
-const say = (said: Said): void => postMessage(said);
+const say = (said: WorkerMessage): void => postMessage(said);
 let newest = -1;
 class Superseded extends Error {}
 
@@ -101,7 +101,7 @@ function watching(id: number): Viewer {
 }
 
 /** Draw; where the graphics processor fails at it, without it, and so from then on. */
-async function drawn(data: Draw): Promise<void> {
+async function generate(data: Draw): Promise<void> {
   const now = await prior!;
   try {
     await draw(now, data);
@@ -130,7 +130,7 @@ onmessage = ({ data }: MessageEvent<string | Draw | Stop>) => {
   newest = data.id;
   last = last.then(async () => {
     try {
-      if (newest === data.id) await drawn(data);
+      if (newest === data.id) await generate(data);
     } catch (error) {
       if (!(error instanceof Superseded)) say({ kind: "failed", id: data.id, message: (error as Error).message });
     }

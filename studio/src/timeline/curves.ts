@@ -71,14 +71,14 @@ export class Curves {
         h(
           "button",
           { class: "text", title: "Another joint; or choose one on the stage (T)", onclick: () => this.next() },
-          this.said(),
+          this.description(),
         ),
       ),
     ];
   }
 
   /** What the joint does at the playhead. */
-  said(): string {
+  description(): string {
     const { joint, time } = this.app.session.value;
     const frame = this.of && Math.min(Math.round(time * this.of[0].fps), this.course.height.length - 1);
     if (frame === null) return jointName(joint);

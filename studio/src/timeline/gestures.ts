@@ -2,7 +2,7 @@
 
 import { type App, duration } from "../app/app";
 import { NOTHING, blocksChosen, chosenBlocks } from "../app/session";
-import { changePose, changeTarget, shiftTarget } from "../project/asks";
+import { changePose, changeTarget, shiftTarget } from "../project/constraints";
 import { changeMarker } from "../project/markers";
 import { type Project, SHORTEST, begins, clamp, length, newId, round } from "../project/model";
 import { writeTrack } from "../panels/tracks";

@@ -2,7 +2,7 @@
 
 import type { App } from "../app/app";
 import { h } from "../app/dom";
-import { measuredIn } from "../app/measured";
+import { eventsInBlock } from "../app/blockEvents";
 import { notesOf } from "../project/goals";
 
 /** Milliseconds that the pointer rests on a block before it is asked about. */
@@ -21,7 +21,7 @@ export function tips(app: App, blocks: HTMLElement): void {
   const show = async (block: HTMLElement, id: string) => {
     const one = app.project.value.segments.find((segment) => segment.id === id);
     const lines = one
-      ? [...(await measuredIn(app, one)), ...notesOf(app.project.value, one).map((note) => note.line)]
+      ? [...(await eventsInBlock(app, one)), ...notesOf(app.project.value, one).map((note) => note.line)]
       : [];
     if (over !== id || !lines.length || !block.isConnected) return;
     tip.replaceChildren(...lines.map((line) => h("p", {}, line)));

@@ -4,7 +4,7 @@ import type { App } from "../app/app";
 import { h } from "../app/dom";
 import { writeTrack } from "../panels/tracks";
 import { type Project, keptTake } from "../project/model";
-import { ORDER, PARTS, type Part, trackKey, trackSaid } from "../project/tracks";
+import { ORDER, PARTS, type Part, trackKey, trackText } from "../project/tracks";
 
 /** The parts that have words of their own; null in place of them: none has. */
 export function partsShown(project: Project, who: number): (Part | null)[] {
@@ -21,7 +21,7 @@ export function trackRows(app: App, who: number, span: (from: number, until: num
   return partsShown(value, who).map((part) => {
     const own = value.people[who]!.tracks.filter((one) => one.part === part);
     const stretches = own.map((one) => {
-      const text = trackSaid(one);
+      const text = trackText(one);
       const isOld = text !== "" && !drawn.includes(trackKey(who, one));
       const isChosen = selection.kind === "track" && selection.id === one.id;
       const label = `${PARTS[one.part].name}: ${text || "nothing yet"}, ${one.from.toFixed(2)} to ${one.until.toFixed(2)} s`;

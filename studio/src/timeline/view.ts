@@ -177,7 +177,7 @@ export class TimelineView {
     const x = this.app.session.value.time * this.scale;
     this.playhead.style.transform = `translateX(${x}px)`;
     const said = this.app.session.value.curves && this.content.querySelector(".curves button");
-    if (said) said.textContent = this.curves.said();
+    if (said) said.textContent = this.curves.description();
     if (!this.app.session.value.playing) return;
     const { scrollLeft, clientWidth } = this.scroll;
     if (x < scrollLeft || x > scrollLeft + clientWidth - 40) this.scroll.scrollLeft = Math.max(x - 60, 0);
@@ -285,7 +285,7 @@ export class TimelineView {
       ...frozen,
       ...(second ? [] : [add]),
       !second &&
-        this.said((at) =>
+        this.tooltip((at) =>
           at.kind === "segment"
             ? begins(project.segments)[project.segments.findIndex((one) => one.id === at.id)]!
             : null,
@@ -294,7 +294,7 @@ export class TimelineView {
   }
 
   /** What went wrong here, beside its cause; `time` gives where that is, or null where it is elsewhere. */
-  private said(time: (at: Place) => number | null): HTMLElement | false {
+  private tooltip(time: (at: Place) => number | null): HTMLElement | false {
     const { error } = this.app.session.value;
     const at = error?.at ? time(error.at) : null;
     if (!error || at === null) return false;
@@ -443,7 +443,7 @@ export class TimelineView {
           ),
         ]
       : [h("span", { class: "hint" }, "P, then draw on the floor")];
-    const said = this.said((at) => (at.kind === "path" && at.who === who ? 0 : null));
+    const said = this.tooltip((at) => (at.kind === "path" && at.who === who ? 0 : null));
     return h(
       "div",
       { class: "track path", "data-drag": "band", "data-key": "path", "aria-label": "Path" },
@@ -480,7 +480,7 @@ export class TimelineView {
       "div",
       { class: "track joints", "data-drag": "band", "data-key": "joints", "aria-label": "Targets of joints" },
       ...(keys.length ? keys : [h("span", { class: "hint" }, "T, then drag a joint")]),
-      this.said((at) =>
+      this.tooltip((at) =>
         at.kind === "target" && at.who === who ? (person.targets.find((one) => one.id === at.id)?.time ?? null) : null,
       ),
     );
@@ -507,7 +507,7 @@ export class TimelineView {
       "div",
       { class: "track poses", "data-drag": "band", "data-key": "poses", "data-drop": "pose", "aria-label": "Poses" },
       ...(keys.length ? keys : [h("span", { class: "hint" }, "O keeps the pose at hand")]),
-      this.said((at) =>
+      this.tooltip((at) =>
         at.kind === "pose" && at.who === who ? (person.poses.find((one) => one.id === at.id)?.time ?? null) : null,
       ),
     );

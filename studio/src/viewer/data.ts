@@ -5,14 +5,14 @@ import * as THREE from "three";
 import type { GLTF } from "three/addons/loaders/GLTFLoader.js";
 import { type MotionClip, POSE, motionClip } from "../body/clip";
 import { JOINTS } from "../body/skeleton";
-import { type Actor, actorOf, parsed, placed } from "../stage/actor";
+import { type Actor, actorOf, parseGltf, setTime } from "../stage/actor";
 
 /** Frames a second of a file that does not say any, and frames that are looked at at most. */
 const RATE = 30;
 const MOST = 20_000;
 
 /** As `motionloom/viz/page.py` writes it. */
-export interface Given {
+export interface MotionJson {
   readonly takes: readonly GivenTake[];
   /** Metres of which places are whole numbers. */
   readonly unit: number;
@@ -41,8 +41,8 @@ export interface Take {
   readonly actors: readonly Actor[];
 }
 
-export async function takesOf(given: Given): Promise<Take[]> {
-  const file = given.character === null ? null : await parsed(await inflated(given.character));
+export async function takesOf(given: MotionJson): Promise<Take[]> {
+  const file = given.character === null ? null : await parseGltf(await inflated(given.character));
   const read = given.takes.map(async ({ fps, people }) =>
     motionClip(fps, await Promise.all(people.map((one) => placesOf(one, given.unit)))),
   );
@@ -69,7 +69,7 @@ function sampled(actor: Actor, joints: readonly THREE.Object3D[], fps: number): 
   const frames = Math.min(Math.round(actor.seconds * fps) + 1, MOST);
   const places = new Float32Array(frames * POSE);
   for (let frame = 0; frame < frames; frame += 1) {
-    placed([actor], frame / fps, true);
+    setTime([actor], frame / fps, true);
     actor.root.updateMatrixWorld(true);
     joints.forEach((joint, n) =>
       new THREE.Vector3().setFromMatrixPosition(joint.matrixWorld).toArray(places, frame * POSE + n * 3),

@@ -4,7 +4,7 @@ import "../style/colors.css";
 import "../style/buttons.css";
 import "./viewer.css";
 import { h } from "../app/dom";
-import { type Given, takesOf } from "./data";
+import { type MotionJson, takesOf } from "./data";
 import { Viewer } from "./viewer";
 
 const text = (id: string): string => document.getElementById(id)?.textContent ?? "";
@@ -14,7 +14,7 @@ async function start(): Promise<void> {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
   root.dataset.theme = dark ? "dark" : "light";
   try {
-    const takes = await takesOf(JSON.parse(text("motion")) as Given);
+    const takes = await takesOf(JSON.parse(text("motion")) as MotionJson);
     const playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     new Viewer(root, takes, { dark, playing, keys: window, notices: text("notices").trim() });
     document.body.dataset.ready = "true";

@@ -4,7 +4,7 @@ import * as THREE from "three";
 import type { Signal } from "../app/signal";
 import { type MotionClip, facingAt, jointAt } from "../body/clip";
 import { HEAD, PELVIS } from "../body/skeleton";
-import { placed } from "../stage/actor";
+import { setTime } from "../stage/actor";
 import { Cast } from "../stage/cast";
 import { Scene } from "../stage/scene";
 import { DARK, GHOSTS, LIGHT } from "../stage/theme";
@@ -81,7 +81,7 @@ export class ViewStage {
   shown(): void {
     const { trails, ghosts, take } = this.view.value;
     this.trails.show(trails ? this.take.clip : null);
-    this.takes.forEach((one, index) => index !== take && placed(one.actors, 0, false));
+    this.takes.forEach((one, index) => index !== take && setTime(one.actors, 0, false));
     if (!ghosts) this.cast.showGhosts([], 0);
     this.place();
   }
@@ -90,7 +90,7 @@ export class ViewStage {
   place(): void {
     const { time, ghosts } = this.view.value;
     const { clip, actors } = this.take;
-    placed(actors, time, true);
+    setTime(actors, time, true);
     this.cast.show(clip, time, actors.length > 0);
     if (ghosts) {
       const others = this.takes.flatMap((one, index) =>

@@ -143,7 +143,7 @@ def test_where_a_goal_faces_is_where_its_features_say() -> None:
 def test_a_kind_asks_for_so_many_places_and_fixes_so_many_numbers(name: str, pairs: int, fixed: int) -> None:
     features = ITEMS[0].features
     target = control_kinds.target_of(kind(name), np.concatenate([features, features])[:60], "walks")
-    assert (target.goal.asked.any(axis=-1).sum(), target.mask.sum()) == (pairs, fixed)
+    assert (target.goal.mask.any(axis=-1).sum(), target.mask.sum()) == (pairs, fixed)
 
 
 def test_keyframes_are_whole_seconds_and_in_between_leaves_the_middle() -> None:
@@ -162,8 +162,8 @@ def test_the_published_numbers_are_the_published_masks() -> None:
 def test_a_joint_without_the_trajectory_is_asked_in_the_world_and_its_path_is_not() -> None:
     goal = control_kinds.target_of(kind("left_wrist"), ITEMS[2].features, "walks").goal
     assert goal.joints == ("left_wrist",)
-    assert not goal.facing_asked.any()
-    assert goal.asked[:, WRIST].all()
+    assert not goal.facing_mask.any()
+    assert goal.mask[:, WRIST].all()
     assert goal.positions[-1, WRIST, 2] > 0.5
 
 

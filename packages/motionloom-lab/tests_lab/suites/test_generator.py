@@ -12,7 +12,7 @@ from motionloom.goals.timeline import timeline_of
 from motionloom.kinematics.physics import bone_length_error
 from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.tasks.long import compose
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.weights.prior import Card, Prior
 from motionloom_lab.suites.generator import generator
 from motionloom_train.modules import prior_session
@@ -62,7 +62,7 @@ def test_actions_that_follow_each_other_are_the_long_motion_that_generate_makes(
     made, _ = generator(prior, steps=2)(["a", prompt], seconds=4.0, seed=5)
     segments = timeline_of(prompt, 4.0).segments
     assert [segment.text for segment in segments] == ["a person walks forward", "a person sits down"]
-    expected = concatenated(*compose(prior, segments, seed=6, steps=2)).positions()
+    expected = concatenate(*compose(prior, segments, seed=6, steps=2)).positions()
     assert made[1].shape == (80, 22, 3)
     np.testing.assert_array_equal(made[1], expected)
     np.testing.assert_array_equal(generator(prior, steps=2)([prompt], seconds=4.0, seed=6)[0][0], expected)

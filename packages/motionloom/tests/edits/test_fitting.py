@@ -35,13 +35,13 @@ def standing(frames: int = 100) -> Motion:
 
 def asked(motion: Motion, joint: int, frames: slice | list[int], places: np.ndarray) -> Goal:
     goal = Goal.nothing(len(motion))
-    goal.positions[frames, joint], goal.asked[frames, joint] = places, True
+    goal.positions[frames, joint], goal.mask[frames, joint] = places, True
     return goal
 
 
 def off(motion: Motion, goal: Goal) -> NDArray[np.float64]:
-    error = np.where(goal.asked, motion.positions() - goal.positions, 0.0)
-    return np.linalg.norm(error, axis=-1)[goal.asked.any(-1)]
+    error = np.where(goal.mask, motion.positions() - goal.positions, 0.0)
+    return np.linalg.norm(error, axis=-1)[goal.mask.any(-1)]
 
 
 def lengths(motion: Motion) -> NDArray[np.float64]:
@@ -52,7 +52,7 @@ def lengths(motion: Motion) -> NDArray[np.float64]:
 def test_no_target_and_a_target_that_is_met_leave_the_motion_alone() -> None:
     motion = standing()
     assert fit(motion, Goal.nothing(100)) is motion
-    goal = replace(Goal.nothing(100), positions=motion.positions(), asked=np.ones((100, 22, 3), bool))
+    goal = replace(Goal.nothing(100), positions=motion.positions(), mask=np.ones((100, 22, 3), bool))
     assert fit(motion, goal) is motion
 
 
@@ -145,7 +145,7 @@ def test_a_shifted_path_is_met_and_standing_feet_still_stand() -> None:
     motion = walking()
     goal = Goal.nothing(100)
     goal.positions[:, 0] = motion.root + np.stack([0.3 * np.arange(100) / 99, *np.zeros((2, 100))], axis=-1)
-    goal.asked[:, 0, [0, 2]] = True
+    goal.mask[:, 0, [0, 2]] = True
     made = fit(motion, goal)
     assert off(made, goal).max() < 0.001
     standing_frames = ((np.arange(99) % 20) > 1) & ((np.arange(99) % 20) < 8)

@@ -88,7 +88,7 @@ def test_a_hand_that_hangs_down_is_not_reached_for() -> None:
     one.look(places)
     assert all(goal.empty for goal in one.goals(places))
     places[0, :, RIGHT] = [0.1, 1.05, 0.3]
-    assert one.goals(places)[1].asked[one.frame, RIGHT].all()
+    assert one.goals(places)[1].mask[one.frame, RIGHT].all()
     held = one.goals(places)[1].positions[one.frame, RIGHT]
     assert np.linalg.norm(held - places[0, one.frame, RIGHT]) < 0.05
 
@@ -123,7 +123,7 @@ def test_an_arm_in_a_chest_comes_out() -> None:
     first, second = (person.positions() for person in couple(0.45))
     first[:, RIGHT] = second[:, SMPL22.index("spine3")] + [0.02, 0.0, 0.03]
     goal = arms_out(first, second)
-    assert goal.asked[:, RIGHT].all()
-    moved_out = np.where(goal.asked, goal.positions, first)
+    assert goal.mask[:, RIGHT].all()
+    moved_out = np.where(goal.mask, goal.positions, first)
     assert overlap(moved_out, second).max() < overlap(first, second).max() / 2
     assert arms_out(*(person.positions() for person in couple(1.5))).empty

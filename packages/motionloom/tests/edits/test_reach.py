@@ -17,7 +17,7 @@ def standing() -> np.ndarray:
 def asking(height: float, joint: int = WRIST) -> Goal:
     """The joint straight above its shoulder in frame 20."""
     goal = Goal.nothing(FRAMES)
-    goal.positions[20, joint], goal.asked[20, joint] = standing()[20, SHOULDER] * [1, 0, 1] + [0, height, 0], True
+    goal.positions[20, joint], goal.mask[20, joint] = standing()[20, SHOULDER] * [1, 0, 1] + [0, height, 0], True
     return goal
 
 
@@ -44,7 +44,7 @@ def test_only_what_is_too_high_is_asked_lower() -> None:
     height = lowered(far, places, room).positions[20, WRIST, 1]
     assert shoulder + 0.5 < height < shoulder + 0.75
     assert lowered(asking(2.9, SMPL22.index("head")), places, room).positions[20, SMPL22.index("head"), 1] < 2.0
-    far.asked[20, 0, 1] = True
+    far.mask[20, 0, 1] = True
     assert lowered(far, places, room) is far
 
 

@@ -49,7 +49,7 @@ def asking(frames: int, joint: int, at: dict[int, tuple[float, float, float]]) -
     goal = Goal.nothing(frames)
     for frame, place in at.items():
         goal.positions[frame, joint] = place
-        goal.asked[frame, joint] = (True, joint != 0, True)
+        goal.mask[frame, joint] = (True, joint != 0, True)
     return goal
 
 
@@ -101,7 +101,7 @@ def test_a_goal_that_is_drawn_already_changes_nothing(prior: Prior) -> None:
     row = guess()
     places = decoded(row, prior)
     goal = replace(Goal.nothing(60), positions=places)
-    goal.asked[:, [0, WRIST]] = True
+    goal.mask[:, [0, WRIST]] = True
     np.testing.assert_allclose(toward(goal, prior)(row, 25), row, atol=1e-4)
 
 
@@ -118,7 +118,7 @@ def test_a_dense_path_is_followed_and_the_body_turns_with_it(prior: Prior) -> No
 
 def test_facing_asked_is_faced(prior: Prior) -> None:
     goal = Goal.nothing(60)
-    goal.facing[40:], goal.facing_asked[40:] = -1.2, True
+    goal.facing[40:], goal.facing_mask[40:] = -1.2, True
     after = decoded(toward(goal, prior)(guess(), 25), prior)
     np.testing.assert_allclose(heading(after)[40:] - heading(after)[0], -1.2 - heading(after)[0], atol=0.1)
 
@@ -191,6 +191,6 @@ def test_many_targets_are_thinned_and_still_met(prior: Prior, monkeypatch: pytes
     monkeypatch.setattr("motionloom.edits.steering.MOST", 100)
     row, other = guess(seed=0), guess(seed=1)
     goal = replace(Goal.nothing(60), positions=decoded(other, prior))
-    goal.asked[:, [WRIST, HEAD, 7, 8]] = True
+    goal.mask[:, [WRIST, HEAD, 7, 8]] = True
     after = decoded(toward(goal, prior)(row, 1), prior)
     assert np.linalg.norm((after - goal.positions)[:, [WRIST, HEAD]], axis=-1).mean() < 0.03

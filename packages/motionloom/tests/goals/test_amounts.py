@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.amount_goal import goal_for, kept, measured, seconds_for
+from motionloom.goals.amount_goal import goal_for, is_met, measured, seconds_for
 from motionloom.goals.amounts import read_amount, read_seconds
 from motionloom.goals.sequence import natural_seconds
 from motionloom.goals.timeline import timeline_of
@@ -116,7 +116,7 @@ def test_a_goal_ends_where_the_words_say(text: str, more: float) -> None:
     side = 1 if amount.direction == "left" else -1
     if amount.kind == "turn":
         assert np.degrees(goal.facing[-1]) == pytest.approx(side * amount.size)
-        assert not goal.asked.any()
+        assert not goal.mask.any()
         return
     if amount.kind != "arc":
         assert np.hypot(moved[0], moved[2]) == pytest.approx(amount.metres)
@@ -132,7 +132,7 @@ def test_a_motion_that_stands_misses() -> None:
     still = np.zeros((10, 22, 3))
     still[:, [2, 17], 0], still[:, [1, 16], 0] = -0.1, 0.1
     assert measured(amount, still) == 0
-    assert not kept(amount, 0)
+    assert not is_met(amount, 0)
 
 
 def test_repetitions_are_strokes_one_after_the_other() -> None:

@@ -26,13 +26,13 @@ PLACES = st.builds(GroundPose, *[st.floats(-50, 50)] * 2, st.floats(-7, 7))
 def asking(frame: int, joint: str, place: list[float], frames: int = 10) -> Goal:
     goal = Goal.nothing(frames)
     goal.positions[frame, SMPL22.index(joint)] = place
-    goal.asked[frame, SMPL22.index(joint)] = True
+    goal.mask[frame, SMPL22.index(joint)] = True
     return goal
 
 
 def facing(frame: int, angle: float, frames: int = 10) -> Goal:
     goal = Goal.nothing(frames)
-    goal.facing[frame], goal.facing_asked[frame] = angle, True
+    goal.facing[frame], goal.facing_mask[frame] = angle, True
     return goal
 
 
@@ -52,9 +52,9 @@ def test_to_the_world_and_back_is_nothing(place: GroundPose, point: list[float])
 def test_a_goal_seen_from_two_places_is_the_same_goal(first: GroundPose, second: GroundPose) -> None:
     """Seen from the second as the first sees it, it is what the second sees."""
     goal = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0.5)), start=GroundPose(1, 2, 0.25))
-    here = goal.seen_from(first).seen_from(second.seen_from(first))
-    there = goal.seen_from(second)
-    assert np.allclose(here.positions[goal.asked], there.positions[goal.asked], atol=1e-8)
+    here = goal.relative_to(first).relative_to(second.seen_from(first))
+    there = goal.relative_to(second)
+    assert np.allclose(here.positions[goal.mask], there.positions[goal.mask], atol=1e-8)
     assert np.allclose(turn_between(here.facing[3], there.facing[3]), 0, atol=1e-9)
     assert here.start is not None
     assert there.start is not None
@@ -63,18 +63,18 @@ def test_a_goal_seen_from_two_places_is_the_same_goal(first: GroundPose, second:
 
 def test_one_horizontal_coordinate_cannot_be_turned() -> None:
     goal = asking(0, "head", [1, 2, 3])
-    goal.asked[0, 15, 0] = False
-    assert goal.seen_from(GroundPose(1, 1, 0.0)).positions[0, 15, 1] == 2
+    goal.mask[0, 15, 0] = False
+    assert goal.relative_to(GroundPose(1, 1, 0.0)).positions[0, 15, 1] == 2
     with pytest.raises(MotionloomError, match="only one of x and z"):
-        goal.seen_from(GroundPose(0, 0, 1.0))
+        goal.relative_to(GroundPose(0, 0, 1.0))
 
 
 def test_parts_of_a_goal_keep_their_frames() -> None:
     goal = replace(asking(3, "head", [1, 2, 3]), start=GroundPose(1, 0, 0))
-    assert goal.crop(2, 5).asked[1, 15].all()
+    assert goal.crop(2, 5).mask[1, 15].all()
     assert goal.crop(2, 5).start is None
     assert goal.crop(0, 5).start == goal.start
-    assert goal.padded(4, 2).asked[7, 15].all()
+    assert goal.padded(4, 2).mask[7, 15].all()
     assert len(goal.padded(4, 2)) == 16
     assert goal.padded(1, 0).start is None
     assert goal.padded(0, 1).start == goal.start
@@ -86,7 +86,7 @@ def test_both_targets_are_in_merged_goals() -> None:
     both = merged(asking(3, "head", [1, 2, 3]), merged(asking(4, "neck", [4, 5, 6]), facing(2, 1.5)))
     assert both.positions[3, 15].tolist() == [1, 2, 3]
     assert both.positions[4, 12].tolist() == [4, 5, 6]
-    assert (both.asked.sum(), both.facing[2], both.facing_asked.sum()) == (6, 1.5, 1)
+    assert (both.mask.sum(), both.facing[2], both.facing_mask.sum()) == (6, 1.5, 1)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_the_place_of_a_goal() -> None:
     path = Goal.nothing(10)
     path.positions[:, 0, 0] = 3 + np.arange(10) * 0.04
     path.positions[:, 0, 2] = -1 - np.arange(10) * 0.04
-    path.asked[:, 0, ::2] = True
+    path.mask[:, 0, ::2] = True
     assert start_of(path) == GroundPose(3, -1, pytest.approx(3 * np.pi / 4))
     assert start_of(merged(path, facing(0, 1.0))) == GroundPose(3, -1, 1.0)
     assert start_of(replace(path, start=GroundPose(1, 2, 3))) == GroundPose(1, 2, 3)
@@ -126,7 +126,7 @@ def test_the_place_of_a_goal() -> None:
 @given(PLACES)
 def test_a_whole_pose_says_where_the_person_stands(place: GroundPose) -> None:
     goal = Goal.nothing(2)
-    goal.positions[0], goal.asked[0] = place.to_world(SMPL22.rest_positions()), True
+    goal.positions[0], goal.mask[0] = place.to_world(SMPL22.rest_positions()), True
     found = start_of(goal)
     assert (found.x, found.z) == pytest.approx((place.x, place.z), abs=1e-9)
     assert abs(turn_between(found.facing, place.facing)) < 1e-3
@@ -153,9 +153,9 @@ def test_joined_goals_are_one_behind_the_other() -> None:
     for cut in range(1, 10):
         again = joined(goal.crop(0, cut), replace(goal.crop(cut, 10), start=GroundPose(9, 9, 9)))
         assert np.array_equal(again.positions, goal.positions)
-        assert np.array_equal(again.asked, goal.asked)
+        assert np.array_equal(again.mask, goal.mask)
         assert np.array_equal(again.facing, goal.facing)
-        assert np.array_equal(again.facing_asked, goal.facing_asked)
+        assert np.array_equal(again.facing_mask, goal.facing_mask)
         assert again.start == goal.start
     assert len(joined(Goal.nothing(2), Goal.nothing(5))) == 7
 
@@ -165,11 +165,11 @@ def test_of_overlaid_goals_the_first_one_counts() -> None:
         merged(asking(3, "head", [1, 2, 3]), facing(2, 1.5)),
         merged(asking(3, "head", [7, 8, 9]), facing(2, 0)),
     )
-    first.asked[3, 15, 1] = False
+    first.mask[3, 15, 1] = False
     both = overlaid(first, merged(second, merged(asking(4, "neck", [4, 5, 6]), facing(5, 0.25))))
     assert both.positions[3, 15].tolist() == [1, 8, 3]
     assert both.positions[4, 12].tolist() == [4, 5, 6]
-    assert (both.facing[2], both.facing[5], both.asked.sum(), both.facing_asked.sum()) == (1.5, 0.25, 6, 2)
+    assert (both.facing[2], both.facing[5], both.mask.sum(), both.facing_mask.sum()) == (1.5, 0.25, 6, 2)
     here, there = (replace(goal, start=GroundPose(x)) for goal, x in ((first, 1.0), (second, 2.0)))
     assert [overlaid(*pair).start for pair in ((here, there), (first, there), (here, second))] == [
         GroundPose(1.0),
@@ -190,6 +190,6 @@ def test_placing_a_goal_turns_and_moves_it() -> None:
 @given(PLACES)
 def test_a_goal_placed_and_seen_from_there_is_itself(place: GroundPose) -> None:
     goal = merged(asking(3, "head", [1, 2, 3]), facing(3, 0.5))
-    again = goal.placed(place).seen_from(place)
-    assert np.allclose(again.positions[goal.asked], goal.positions[goal.asked], atol=1e-8)
+    again = goal.placed(place).relative_to(place)
+    assert np.allclose(again.positions[goal.mask], goal.positions[goal.mask], atol=1e-8)
     assert again.facing[3] == pytest.approx(0.5)

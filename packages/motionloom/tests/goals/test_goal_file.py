@@ -70,13 +70,13 @@ def test_a_path_begins_where_it_says_and_so_does_the_person(read) -> None:
     assert places(closed)[99].tolist() == [0, 0]
     timed = read(path={"points": [[0, 0], [0, 1], [0, 1]], "times": [0, 2, 4]})
     assert places(timed)[[20, 40, 60, 80], 1] == pytest.approx([0.5, 1, 1, 1], abs=0.15)
-    assert not timed.asked[81:].any()
+    assert not timed.mask[81:].any()
 
 
 def test_somebody_who_looks_elsewhere_has_a_second_to_turn(read) -> None:
     goal = read(path={"points": [[0, 0], [0, 4]]}, start={"facing": 90})
     assert goal.start.facing == pytest.approx(np.pi / 2)
-    assert np.flatnonzero(goal.facing_asked).tolist() == list(range(20, 100))
+    assert np.flatnonzero(goal.facing_mask).tolist() == list(range(20, 100))
 
 
 def test_drawings_and_curves_lie_where_the_person_stands(read) -> None:
@@ -97,9 +97,9 @@ def test_joints_at_times_by_name_and_group(read) -> None:
     points = [{"time": 1, "position": [0.1, 1.2, 0.3]}, {"time": 5, "position": [None, 1.4, None]}]
     goal = read(joints=[{"joint": "left_wrist", "points": points}, {"joint": "feet", "every_frame": [None, [0, 0, 0]]}])
     assert goal.positions[20, WRIST].tolist() == [0.1, 1.2, 0.3]
-    assert goal.asked[99, WRIST].tolist() == [False, True, False]
-    assert np.flatnonzero(goal.asked[:, WRIST].any(-1)).tolist() == [20, 99]
-    assert goal.asked[1].all(axis=-1).nonzero()[0].tolist() == [7, 8, 10, 11]
+    assert goal.mask[99, WRIST].tolist() == [False, True, False]
+    assert np.flatnonzero(goal.mask[:, WRIST].any(-1)).tolist() == [20, 99]
+    assert goal.mask[1].all(axis=-1).nonzero()[0].tolist() == [7, 8, 10, 11]
     assert start_of(goal) == GroundPose()
 
 
@@ -107,7 +107,7 @@ def test_a_curve_asks_for_every_frame_between_its_points(read) -> None:
     points = [{"time": t, "position": [0.3, y, 0.3]} for t, y in ((1, 1.0), (2, 1.5), (3, 1.5), (4, 1.2))]
     goal = read(joints=[{"joint": "left_wrist", "points": points, "curve": True}])
     y = goal.positions[20:81, WRIST, 1]
-    assert goal.asked[:, WRIST, 1].nonzero()[0].tolist() == list(range(20, 81))
+    assert goal.mask[:, WRIST, 1].nonzero()[0].tolist() == list(range(20, 81))
     assert y[[0, 20, 40, 60]] == pytest.approx([1, 1.5, 1.5, 1.2])
     assert y.max() == pytest.approx(1.5)
 
@@ -126,7 +126,7 @@ def test_a_pose_stands_where_the_person_does(read) -> None:
     """The same pose, turned from +X to +Z and moved; later on the path's place at that time."""
     own = to_smpl22(walker()).positions()[40]
     goal = read(poses=[{"time": 0, "from": "walk.bvh", "at": 1.0}], start={"position": [1, 2]})
-    assert goal.asked[0].all()
+    assert goal.mask[0].all()
     expected = np.stack([-own[:, 2] + own[0, 2] + 1, own[:, 1], own[:, 0] - own[0, 0] + 2], axis=-1)
     assert goal.positions[0] == pytest.approx(expected, abs=2e-3)
     goal = read(poses=[{"time": 0, "from": "walk.bvh", "position": [4, 4], "facing": 90}])
@@ -142,12 +142,12 @@ def test_following_takes_the_places_of_the_other_world(read) -> None:
     clip = to_smpl22(walker()).positions()
     goal = read(follow={"from": "walk.bvh", "joints": ["left_wrist"], "from_time": 0.5})
     assert goal.joints == ("left_wrist",)
-    assert goal.asked[:, WRIST].all(-1).sum() == 30  # the clip has 40 frames at 20 a second
+    assert goal.mask[:, WRIST].all(-1).sum() == 30  # the clip has 40 frames at 20 a second
     # the file does not say where the floor is: it is found anew, a millimetre off
     assert goal.positions[10, WRIST] == pytest.approx(clip[40, WRIST], abs=2e-3)
     assert (goal.start.x, goal.start.z, goal.start.facing) == pytest.approx((2.5, 1, np.pi / 2), abs=2e-3)
     sparse = read(follow=[{"from": "walk.bvh", "joints": ["hands"], "times": [0, 1.5]}], start={"position": [2, 1]})
-    assert sparse.asked[:, WRIST].any(-1).nonzero()[0].tolist() == [0, 30]
+    assert sparse.mask[:, WRIST].any(-1).nonzero()[0].tolist() == [0, 30]
     assert sparse.start == GroundPose(2, 1, 0)
 
 
@@ -155,7 +155,7 @@ def test_follow_of_a_motion() -> None:
     goal = follow(walker(), ["pelvis", "left_wrist"], frames=25)
     assert goal.joints == ("pelvis", "left_wrist")
     assert goal.positions[20, 0, ::2] == pytest.approx([3, 1], abs=2e-3)
-    assert follow(walker(), ["head"], frames=100, at=[1.0]).asked[20, 15].all()
+    assert follow(walker(), ["head"], frames=100, at=[1.0]).mask[20, 15].all()
     for wrong in ([2.1], [-1.0], []):
         with pytest.raises(MotionloomError, match="can be followed at 0 to"):
             follow(walker(), ["head"], frames=100, at=wrong)
@@ -365,5 +365,5 @@ def test_whatever_is_put_anywhere_is_a_goal_or_a_sentence_and_what_is_read_fits_
 
 @pytest.mark.parametrize("number", range(len(GOOD)))
 def test_what_is_good_is_read_and_fits_the_schema(number: int, folder: Path) -> None:
-    assert read_goal(GOOD[number], frames=100, folder=folder).asked.any()
+    assert read_goal(GOOD[number], frames=100, folder=folder).mask.any()
     assert fits(GOOD[number], WHOLE, WHOLE)

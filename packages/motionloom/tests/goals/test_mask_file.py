@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.hold import FixedPart
-from motionloom.goals.mask_file import all_held, check_names, read_mask
+from motionloom.goals.mask_file import check_names, fixes_everything, read_mask
 from motionloom.goals.schemas import MASK_JOINTS as JOINTS
 from motionloom.goals.schemas import mask_schema
 from motionloom.requests.mask import MASK, PART
@@ -58,7 +58,7 @@ def test_neighbouring_stretches_of_frames_leave_no_gap_and_share_no_frame(read, 
     spans = read('{"hold": [{"joints": ["head"], "frames": [[0, 7], [7, 1000], [1000, 2000]]}]}', fps=fps)[0].spans
     counts = [sum(a <= (k + 1) / fps <= b for a, b in spans) for k in range(2100)]
     assert counts == [1] * 2000 + [0] * 100
-    assert all_held((FixedPart(SMPL22.names, spans),), 2000 / fps)
+    assert fixes_everything((FixedPart(SMPL22.names, spans),), 2000 / fps)
 
 
 def test_yaml_says_the_same(read):
@@ -139,7 +139,7 @@ def test_names_on_the_line_are_checked_the_same():
     ],
 )
 def test_only_all_joints_all_of_the_time_leave_nothing_to_predict(parts, held):
-    assert all_held(parts, 2.0) is held
+    assert fixes_everything(parts, 2.0) is held
 
 
 # The schema ------------------------------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ def test_somebody_on_a_circle_turns_evenly_to_the_left() -> None:
     assert goal.facing == pytest.approx(np.linspace(0, 2 * np.pi, 101), abs=1e-3)
     steps = np.linalg.norm(np.diff(places(goal), axis=0), axis=-1)
     assert steps == pytest.approx(2 * np.pi / 100, rel=1e-3)
-    assert goal.asked.sum() == 202
+    assert goal.mask.sum() == 202
 
 
 def test_a_stop_is_a_stop_and_nothing_overshoots() -> None:
@@ -70,14 +70,14 @@ def test_a_turned_path_is_the_path_of_turned_points() -> None:
 def test_straight_lines_have_corners_where_the_points_are() -> None:
     goal = root_path([[0, 0], [0, 2], [2, 2]], frames=81, smooth=False, facing="free")
     assert places(goal)[[20, 40, 60]].tolist() == [[0, 1], [0, 2], [1, 2]]
-    assert not goal.facing_asked.any()
+    assert not goal.facing_mask.any()
 
 
 def test_frames_before_and_after_the_times_are_free() -> None:
     goal = root_path([[0, 0], [0, 1]], [1.0, 2.0], frames=61)
-    assert np.flatnonzero(goal.asked[:, 0, 0]).tolist() == list(range(20, 41))
+    assert np.flatnonzero(goal.mask[:, 0, 0]).tolist() == list(range(20, 41))
     goal = root_path([[0, 0], [0, 1]], frames=61, span=(0.5, 1.0))
-    assert np.flatnonzero(goal.asked[:, 0, 0]).tolist() == list(range(10, 21))
+    assert np.flatnonzero(goal.mask[:, 0, 0]).tolist() == list(range(10, 21))
 
 
 def test_somebody_turns_while_standing_not_in_a_frame() -> None:
@@ -98,7 +98,7 @@ def test_facings_in_degrees_turn_as_written() -> None:
 def test_a_path_that_goes_nowhere_faces_nowhere() -> None:
     goal = root_path([[1, 2]], frames=5)
     assert places(goal).tolist() == [[1, 2]] * 5
-    assert not goal.facing_asked.any()
+    assert not goal.facing_mask.any()
     assert (along(np.zeros((4, 2)), 20) == 0).all()
 
 
@@ -107,7 +107,7 @@ def test_nobody_runs_faster_than_twelve_metres_a_second() -> None:
         root_path([[0, 0], [0, 30]], frames=41)
     with pytest.raises(MotionloomError, match=r"from 1\.00 to 2\.00 s"):
         root_path([[0, 0], [0, 1], [0, 14]], [0, 1, 2], frames=41)
-    assert root_path([[0, 0], [0, 23]], frames=41).asked.any()
+    assert root_path([[0, 0], [0, 23]], frames=41).mask.any()
 
 
 @pytest.mark.parametrize(

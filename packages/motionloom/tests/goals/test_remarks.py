@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.goals.remarks import looked_up, remarks_on, verb_words
+from motionloom.goals.remarks import nearest_known, remarks_on, verb_words
 from motionloom.runtime.text.known import NEAR, Nearest
 from motionloom.weights.prior import Prior
 
@@ -40,7 +40,8 @@ def test_phrases_that_nobody_looked_at() -> None:
     prior = Prior.load("default")
     assert prior.known is not None
     called = {
-        kind: [not one.near for one in looked_up(PHRASES[kind]["judge"], prior.known, prior.text)] for kind in PHRASES
+        kind: [not one.near for one in nearest_known(PHRASES[kind]["judge"], prior.known, prior.text)]
+        for kind in PHRASES
     }
     assert sum(called["unknown"]) >= 0.65 * len(called["unknown"])
     assert sum(called["known"]) <= 0.2 * len(called["known"])

@@ -33,14 +33,14 @@ from motionloom.requests.export import Export
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import PredictionSampling, Sampling
 from motionloom.requests.tasks import REQUESTS
-from motionloom.tasks.best import seeds_tried
+from motionloom.tasks.best import candidate_seeds
 from motionloom.tasks.control import control
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.edit import edit
 from motionloom.tasks.long import compose
 from motionloom.tasks.pair import generate_pair, person_seeds
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import generate
 from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
@@ -247,8 +247,8 @@ def second(*_: Any, **__: Any) -> int:
 
 @pytest.fixture
 def second_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionloom.tasks.sampling.best", second)
-    monkeypatch.setattr("motionloom.tasks.completion.smallest", second)
+    monkeypatch.setattr("motionloom.tasks.sampling.best_candidate", second)
+    monkeypatch.setattr("motionloom.tasks.completion.index_of_smallest", second)
 
 
 def the_same(made: Sequence[Motion], expected: Sequence[Motion]) -> None:
@@ -256,14 +256,16 @@ def the_same(made: Sequence[Motion], expected: Sequence[Motion]) -> None:
         np.testing.assert_allclose(one.positions(), other.positions(), atol=2e-4)
 
 
-SEED = next(seed for seed in range(100) if seeds_tried(seed, 2)[1] < 2**62 and seeds_tried(seed + 1, 2)[1] < 2**62)
+SEED = next(
+    seed for seed in range(100) if candidate_seeds(seed, 2)[1] < 2**62 and candidate_seeds(seed + 1, 2)[1] < 2**62
+)
 
 
 @pytest.mark.usefixtures("second_chosen")
 def test_of_words_goals_and_clips_the_seed_that_is_chosen_makes_the_motion() -> None:
     from motionloom.goals.goal_file import read_goal
 
-    prior, other = tiny.prior(), seeds_tried(SEED, 2)[1]
+    prior, other = tiny.prior(), candidate_seeds(SEED, 2)[1]
     goal = read_goal(GOAL, frames=20, folder=Path())
     clip = io.load(CLIP)
 
@@ -280,7 +282,7 @@ def test_of_two_people_both_have_the_seeds_that_are_chosen(monkeypatch: pytest.M
     prior = tiny.prior()
     pair, words = block(prior), "two people hug"
     [made] = generate_pair(prior, pair, words, seconds=1.0, seed=SEED, best_of=2, steps=4)
-    chosen = [seeds_tried(seed, 2)[1] for seed in person_seeds(SEED, 0)]
+    chosen = [candidate_seeds(seed, 2)[1] for seed in person_seeds(SEED, 0)]
     monkeypatch.setattr("motionloom.tasks.pair.pair_seeds", lambda sampling: chosen)
     [expected] = generate_pair(prior, pair, words, seconds=1.0, seed=SEED, steps=4)
     the_same(made, expected)
@@ -296,12 +298,12 @@ def test_rows_of_a_chain_are_chosen_one_by_one(monkeypatch: pytest.MonkeyPatch) 
     segments = plain_timeline(["two people hug", "two people shake hands"], seconds=1.5).segments
 
     def both(best_of: int) -> list[Motion]:
-        one = concatenated(*compose(prior, segments, seed=SEED, steps=4, best_of=best_of))
+        one = concatenate(*compose(prior, segments, seed=SEED, steps=4, best_of=best_of))
         duets = list(compose_pair(prior, pair, segments, seed=SEED, steps=4, best_of=best_of))
-        return [one, *(concatenated(*[duet[i] for duet in duets]) for i in (0, 1))]
+        return [one, *(concatenate(*[duet[i] for duet in duets]) for i in (0, 1))]
 
     made = both(2)
-    monkeypatch.setattr("motionloom.tasks.sampling.seeds_tried", lambda seed, count: [seeds_tried(seed, 2)[1]])
+    monkeypatch.setattr("motionloom.tasks.sampling.candidate_seeds", lambda seed, count: [candidate_seeds(seed, 2)[1]])
     the_same(made, both(1))
 
 
@@ -316,9 +318,9 @@ def test_of_futures_each_window_is_chosen() -> None:
 
 
 def test_a_future_that_moves_comes_before_one_that_stands() -> None:
-    from motionloom.tasks.best import alive, smallest
+    from motionloom.tasks.best import index_of_smallest, liveliness_ranks
 
     moving = io.load(CLIP).positions()
     still = np.repeat(moving[:1], len(moving), axis=0)
-    ranks = alive(np.stack([still, moving, moving]))
-    assert smallest(ranks) == 1
+    ranks = liveliness_ranks(np.stack([still, moving, moving]))
+    assert index_of_smallest(ranks) == 1

@@ -121,7 +121,7 @@ def test_a_motion_that_a_goal_file_names_is_a_persons(robot: Robot) -> None:
     io.save(person, Path("person.npz"))
     asked = {"follow": {"from": "person.npz", "joints": ["left_wrist"]}}
     goals = [read_goal(asked, frames=15, folder=Path(), metre=metre) for metre in (1.0, robot.metre)]
-    assert goals[1].asked.any()
+    assert goals[1].mask.any()
     np.testing.assert_allclose(goals[1].positions, goals[0].positions, atol=1e-9)
     Path("way.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0 L30 0 L30 40"/></svg>')
     drawn = [read_goal({"path": {"svg": "way.svg"}}, frames=60, folder=Path(), metre=m) for m in (1.0, robot.metre)]

@@ -77,7 +77,7 @@ def test_a_goal_is_measured_item_by_item(project: Project) -> None:
     goals = {"path": {"points": [[0, 0], [0, 2]]}, "joints": [wrist, {**wrist, "joint": "right_wrist"}]}
     request = read_request({"task": "control", "prompt": "a", "seconds": 2, "goals": goals}, project, Limits())
     assert [name for name, _ in request.parts] == ["path", "joints[0]", "joints[1]"]
-    counts = [int(goal.asked.any(axis=(0, 2)).sum()) for _, goal in request.parts]
+    counts = [int(goal.mask.any(axis=(0, 2)).sum()) for _, goal in request.parts]
     assert counts == [1, 1, 1]
 
 

@@ -20,8 +20,8 @@ from motionloom.requests.sampling import LARGEST_SEED, Sampling
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import as_rows
 from motionloom.tasks.control import steered_features
-from motionloom.tasks.long import Track, compose, in_world, long_features
-from motionloom.tasks.supported import supported
+from motionloom.tasks.long import Track, compose, long_features, place_pieces
+from motionloom.tasks.supported import add_support
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
 
@@ -106,7 +106,7 @@ def write(prior: Prior, folder: Path, *, precise: bool, weights: dict[str, np.nd
         for text in BORNE:
             [features] = sample_features(prior, [text], [90], seeds=[0])
             found.add(f"{text}.features", features)
-            found.motion(text, supported(to_motion(features.astype(np.float64), prior.fps)))
+            found.motion(text, add_support(to_motion(features.astype(np.float64), prior.fps)))
         for text in WORDED:
             sizes.append(_worded(prior, found, text))
     if precise:
@@ -150,15 +150,15 @@ def _paths(prior: Prior, found: Numbers) -> None:
     """One sentence along a path, as `control` steers it, and a chain along the same one, as `compose` does."""
     goal = root_path(PATH, frames=100)
     place = start_of(goal)
-    [features] = steered_features(prior, ["a person walks"], goal.seen_from(place), seeds=[4])
+    [features] = steered_features(prior, ["a person walks"], goal.relative_to(place), seeds=[4])
     found.add("path.features", features)
     found.motion("path", to_motion(features.astype(np.float64), prior.fps).placed(place))
     segments = [Segment(text, seconds) for text, seconds in CHAINS[0]]
     frames = [round(segment.seconds * prior.fps) for segment in segments]
     track = Track.along(root_path(PATH, frames=sum(frames)), prior.fps)
-    asked = [track.asked(part, sum(frames[:n]), frames[n]) for n, part in enumerate(segments)]
+    asked = [track.with_path(part, sum(frames[:n]), frames[n]) for n, part in enumerate(segments)]
     pieces = long_features(prior, asked, sampling=Sampling(seed=4))
-    places = in_world(prior, pieces, deque([None] * len(asked)), track.place(0), track)
+    places = place_pieces(prior, pieces, deque([None] * len(asked)), track.place(0), track)
     found.add("path of a chain.seen", np.concatenate([piece.positions for piece in places]))
 
 

@@ -101,7 +101,7 @@ def test_in_node_it_draws_what_python_draws(app: Path, prior: Prior, tmp_path: P
     [motion] = compose(prior, segments, sampling=Sampling(seed=4))
     alike(tmp_path, 1, features, motion, std)
     goal = root_path(numbers.PATH, frames=100)
-    [features] = steered_features(prior, ["a person walks"], goal.seen_from(start_of(goal)), seeds=[4])
+    [features] = steered_features(prior, ["a person walks"], goal.relative_to(start_of(goal)), seeds=[4])
     assert (np.abs(read(tmp_path, "2.features", features) - features) / std).max() < 1e-2
     pelvis = np.fromfile(tmp_path / "2.positions", "<f4").reshape(-1, 22, 3)[[0, -1], 0]
     assert np.abs(pelvis[:, [0, 2]] - np.array(numbers.PATH)[[0, -1]]).max() < 0.05

@@ -39,7 +39,7 @@ def row(text: str) -> dict[str, object]:
     if amount is not None and seconds is not None:
         for one in with_amount(Segment(text, seconds), amount):
             goal = one.goal
-            places = [] if goal is None or not goal.asked.any() else goal.positions[:, 0, [0, 2]].tolist()
+            places = [] if goal is None or not goal.mask.any() else goal.positions[:, 0, [0, 2]].tolist()
             facing = [] if goal is None else goal.facing.tolist()
             parts.append(
                 {

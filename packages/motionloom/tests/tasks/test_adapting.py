@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
-from motionloom.tasks.adapting import KEPT, AdaptedPriors, adapt
-from motionloom.tasks.long import long_features, with_loaded
+from motionloom.tasks.adapting import CACHE_SIZE, AdaptedPriors, adapt
+from motionloom.tasks.long import load_segment_adapters, long_features
 from motionloom.tasks.text import sample_features
 from motionloom.weights.adapter import Adapter, fingerprint, origin
 from motionloom.weights.prior import Prior
@@ -128,13 +128,13 @@ def test_how_many_rows_go_together_changes_nothing(prior: Prior) -> None:
 def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> None:
     one = adapter(prior)
     place = one.save(tmp_path / "a.safetensors")
-    (found,) = with_loaded(prior, [replace(WALK, adapters=((place, 0.5),))])
+    (found,) = load_segment_adapters(prior, [replace(WALK, adapters=((place, 0.5),))])
     ((read, factor),) = found.adapters
     assert isinstance(read, Adapter)
     assert (read.name, factor) == ("a1", 0.5)
     (tmp_path / "b.safetensors").write_bytes(b"x" * 100)
     with pytest.raises(MotionloomError, match="not a whole safetensors file"):
-        with_loaded(prior, [replace(WALK, adapters=((tmp_path / "b.safetensors", 0.5),))])
+        load_segment_adapters(prior, [replace(WALK, adapters=((tmp_path / "b.safetensors", 0.5),))])
 
 
 def test_merged_networks_are_kept_but_not_without_end(prior: Prior) -> None:
@@ -143,9 +143,9 @@ def test_merged_networks_are_kept_but_not_without_end(prior: Prior) -> None:
     first = priors.of(((one, 1.0),))
     assert priors.of(((one, 1.0),)) is first
     assert priors.of(()) is prior
-    for number in range(KEPT):
+    for number in range(CACHE_SIZE):
         priors.of(((one, number / 10),))
-    assert len(priors.made) == KEPT
+    assert len(priors.cache) == CACHE_SIZE
 
 
 def test_the_same_seed_and_adapters_draw_the_same(prior: Prior) -> None:

@@ -30,7 +30,9 @@ def best(prior: Prior, prompts: list[str], seeds: list[int], count: int = 4) -> 
 
 def test_of_equals_the_one_nearest_to_the_mean_at_pure_noise_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the weights that ship. The mean is estimated here from other noise, 24 rows of it."""
-    monkeypatch.setattr("motionloom.tasks.best._looked_at", lambda prior, prompt, estimates: [()] * len(estimates))
+    monkeypatch.setattr(
+        "motionloom.tasks.best._candidate_ranks", lambda prior, prompt, estimates: [()] * len(estimates)
+    )
     prior, tried = Prior.load(), [7, *(row_seed(7, number) for number in range(1, 5))]
     noise = normal((24, 40, 263), 1)
     mean = prior.net(noise, 1000, prior.net.bind(prior.condition([TURN] * 24))).mean(0)

@@ -118,7 +118,7 @@ def test_a_goal_beside_a_border_is_met(frame: int) -> None:
     wrist = SMPL22.index("left_wrist")
     goal = Goal.nothing(200)
     once = solve(whole, 20.0).positions()[frame, wrist]
-    goal.positions[frame, wrist], goal.asked[frame, wrist] = once + np.array([0, 0.1, 0]), True
+    goal.positions[frame, wrist], goal.mask[frame, wrist] = once + np.array([0, 0.1, 0]), True
     made = strung(list(solve_stream(cut(replace(whole, goal=goal), [50, 50, 25, 75]), 20.0))).positions()
     assert np.linalg.norm(made[frame, wrist] - goal.positions[frame, wrist]) < 0.005
     assert np.abs(made[frame, SMPL22.index("right_wrist")] - once).max() > 0.1

@@ -9,7 +9,7 @@ from scipy.interpolate import BPoly
 from motionloom.diffusion import row_noise, row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, bone_lengths
-from motionloom.tasks.completion import Known, complete, futures, joined, next_frames
+from motionloom.tasks.completion import Known, complete, futures, join_known, next_frames
 from tests.noise import normal
 from tests.tasks.small_predictor import FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
@@ -33,7 +33,7 @@ def test_a_course_leaves_known_frames_in_value_and_slope_and_comes_to_its_own(kn
     made, given = np.broadcast_to(2 + 0.5 * t, (1, 30, 3)), np.broadcast_to(1 - 0.25 * t, (1, 30, 3))
     mask = np.zeros((1, 30, 1), dtype=np.float64)
     mask[:, first:last] = 1
-    result = joined(made, np.where(mask > 0, given, 99.0), mask, ease=6)[0, :, 0]
+    result = join_known(made, np.where(mask > 0, given, 99.0), mask, ease=6)[0, :, 0]
     expected = np.where(mask[0, :, 0] > 0, given[0, :, 0], made[0, :, 0])
     for border, step, room in ((last - 1, 1, min(6, 30 - last)), (first, -1, min(6, first))):
         slope = -0.75 * step if last - first > 1 else 0.0
@@ -50,7 +50,7 @@ def test_between_two_known_stretches_there_is_no_jump_at_either_border(free: int
     made, given = np.zeros((1, frames, 3), np.float32), np.full((1, frames, 3), 1.0)
     mask = np.ones((1, frames, 1), np.float32)
     mask[:, 10 : 10 + free] = 0
-    result = joined(made, given, mask, ease=12)[0, :, 0]
+    result = join_known(made, given, mask, ease=12)[0, :, 0]
     assert (np.delete(result, slice(10, 10 + free)) == 1).all()
     assert abs(np.diff(result)).max() < 1.9 / (min(free, 12) + 1) + 1e-6
     np.testing.assert_allclose(result, result[::-1], atol=1e-6)
@@ -59,18 +59,18 @@ def test_between_two_known_stretches_there_is_no_jump_at_either_border(free: int
 def test_known_numbers_come_back_exactly_and_soft_masks_mix() -> None:
     made, known, mask = some(4, 30, 12), some(4, 30, 12, seed=1), np.zeros((4, 30, 4), dtype=np.float64)
     mask[:2, :6], mask[2, 3:9, 1], mask[3, 5:, 2], mask[3, 20, 0] = 1, 1, 0.25, 1
-    result = joined(made, known, mask, ease=4)
+    result = join_known(made, known, mask, ease=4)
     each = np.repeat(mask, 3, axis=-1)
     assert np.array_equal(result[each == 1], known[each == 1])
     np.testing.assert_allclose(result[3, 5:, 6:9], 0.75 * made[3, 5:, 6:9] + 0.25 * known[3, 5:, 6:9], atol=1e-5)
-    alone = np.concatenate([joined(*(x[i : i + 1] for x in (made, known, mask)), ease=4) for i in range(4)])
+    alone = np.concatenate([join_known(*(x[i : i + 1] for x in (made, known, mask)), ease=4) for i in range(4)])
     assert np.array_equal(result, alone)
 
 
 def test_nothing_known_and_all_known_change_nothing() -> None:
     made, known = some(2, 9, 6), some(2, 9, 6, seed=1)
-    assert np.array_equal(joined(made, known, np.zeros((2, 9, 2), np.float32), ease=3), made)
-    assert np.array_equal(joined(made, known, np.ones((2, 9, 2), np.float32), ease=3), known)
+    assert np.array_equal(join_known(made, known, np.zeros((2, 9, 2), np.float32), ease=3), made)
+    assert np.array_equal(join_known(made, known, np.ones((2, 9, 2), np.float32), ease=3), known)
 
 
 # Completing
@@ -104,7 +104,7 @@ def test_guidance_one_is_the_told_pass_zero_the_untold_and_two_goes_beyond() -> 
     noise = row_noise([1, 2, 3])(np.empty((3, 16, 66), np.float32))
     for guidance, scale in ((1.0, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0)):
         guess = PREDICTOR.denoiser(rows, np.full(3, bool(guidance)))(scale * noise, PREDICTOR.schedule.steps)
-        plain = joined(PREDICTOR.to_features(guess, pose), features, mask, ease=12)
+        plain = join_known(PREDICTOR.to_features(guess, pose), features, mask, ease=12)
         np.testing.assert_allclose(made(guidance, scale), plain, atol=1e-4, rtol=1e-4)
     assert np.abs(made(1.0) - made(1.0, 0.5)).max() > 0.01
     assert np.abs(made(1.0) - made(0.0)).max() > 0.01

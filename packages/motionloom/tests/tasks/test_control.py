@@ -10,7 +10,7 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.goal import Goal
 from motionloom.ground import GroundPose
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.control import control, controlled_numbers, fitting_adapters, judged
+from motionloom.tasks.control import control, evaluate, fitting_adapters, goal_feature_mask
 from motionloom.tasks.text import generate
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
@@ -34,7 +34,7 @@ def path(frames: int = 24, *, turn: float = 0.0) -> Goal:
     angle = np.linspace(0, np.pi / 2, frames)
     goal = Goal.nothing(frames)
     goal.positions[:, 0] = np.stack([1 - np.cos(angle), 0 * angle, np.sin(angle)], axis=-1)
-    goal.asked[:, 0, [0, 2]] = True
+    goal.mask[:, 0, [0, 2]] = True
     place = GroundPose(3.0 * bool(turn), 0.0, turn)
     return replace(goal, positions=place.to_world(goal.positions), start=place)
 
@@ -66,8 +66,8 @@ def test_motion_i_is_drawn_from_seed_plus_i_whatever_stands_beside_it(prior: Pri
 
 def test_what_is_missed_is_said_worst_first(prior: Prior) -> None:
     goal = replace(Goal.nothing(24), start=GroundPose())
-    goal.positions[12, WRIST], goal.asked[12, WRIST] = [0.0, 4.0, 0.0], True
-    goal.positions[6, WRIST], goal.asked[6, WRIST] = [0.0, 6.0, 0.0], True
+    goal.positions[12, WRIST], goal.mask[12, WRIST] = [0.0, 4.0, 0.0], True
+    goal.positions[6, WRIST], goal.mask[6, WRIST] = [0.0, 6.0, 0.0], True
     made = control(prior, "a person walks", goal, steps=2)[0]
     assert len(made.missed) == 2
     assert made.missed[0].startswith("right_wrist at 0.30 s is ")
@@ -79,17 +79,17 @@ def test_error_is_the_mean_distance_over_what_is_asked(prior: Prior) -> None:
     """One joint 3 cm off on x and 4 cm on z where only these are asked, another met: 2.5 cm."""
     motion = generate(prior, "a person walks", seconds=1.0, steps=2, foot_lock=False)[0]
     goal = replace(Goal.nothing(len(motion)), positions=motion.positions() + np.array([0.03, 7.0, 0.04]))
-    goal.asked[5, WRIST, [0, 2]] = True
-    goal.positions[9, 0], goal.asked[9, 0] = motion.root[9], True
-    found = judged(motion, motion, goal)
+    goal.mask[5, WRIST, [0, 2]] = True
+    goal.positions[9, 0], goal.mask[9, 0] = motion.root[9], True
+    found = evaluate(motion, motion, goal)
     assert found.error == pytest.approx(0.025)
     assert found.worst == pytest.approx(0.05)
 
 
 def test_the_numbers_that_a_goal_is_about() -> None:
     goal = path()
-    goal.asked[3, WRIST] = True
-    mask = controlled_numbers(goal)
+    goal.mask[3, WRIST] = True
+    mask = goal_feature_mask(goal)
     assert np.flatnonzero(mask[5]).tolist() == [0, 1, 2]
     assert np.flatnonzero(mask[3]).tolist() == [0, 1, 2, 64, 65, 66]
 
@@ -140,7 +140,7 @@ def test_the_shipped_prior_walks_a_bent_path_to_a_centimetre() -> None:
     along = np.linspace(0, 3, frames)
     goal = Goal.nothing(frames)
     goal.positions[:, 0, 2], goal.positions[:, 0, 0] = along, 0.4 * np.sin(along * 1.5)
-    goal.asked[:, 0, [0, 2]] = True
+    goal.mask[:, 0, [0, 2]] = True
     made = control(Prior.load(), "a person walks", goal, steps=8)[0]
     assert made.error < 0.01
     assert made.missed == ()
@@ -155,7 +155,7 @@ def test_the_shipped_prior_walks_a_bent_path_to_a_centimetre() -> None:
 def test_a_hand_that_is_asked_too_high_lifts_nobody_but_who_jumps(words: str, least: float, most: float) -> None:
     """2.9 m is beyond both: the feet stay on the floor, if on tiptoe, or leave it as people jump, and it is said."""
     goal, wrist = Goal.nothing(60), SMPL22.index("right_wrist")
-    goal.positions[30, wrist], goal.asked[30, wrist] = [-0.2, 2.9, 0.3], True
+    goal.positions[30, wrist], goal.mask[30, wrist] = [-0.2, 2.9, 0.3], True
     (made,) = control(Prior.load(), words, goal, seed=1, steps=12)
     places = made.motion.positions()
     ankles = places[:, [7, 8], 1].min(axis=1)

@@ -18,7 +18,7 @@ from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import duet as tasks
 from motionloom.tasks.duet import compose_pair, duet_features, react
-from motionloom.tasks.splice import concatenated, person_at_20
+from motionloom.tasks.splice import concatenate, person_at_20
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.noise import normal
@@ -44,7 +44,7 @@ def block(prior: Prior) -> PairBlock:
 
 
 def whole(blocks: list[tuple[Motion, Motion]]) -> list[Motion]:
-    return [concatenated(*[one[i] for one in blocks]) for i in (0, 1)]
+    return [concatenate(*[one[i] for one in blocks]) for i in (0, 1)]
 
 
 # Somebody is given
@@ -106,7 +106,7 @@ def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, bl
 def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: PairBlock) -> None:
     net = block.net(prior)
     longer = [replace(segment, seconds=segment.seconds + 2.5) for segment in SEGMENTS]  # long enough for being led
-    both = [tasks._asked(longer, i, None, 0) for i in (0, 1)]
+    both = [tasks._segments_of(longer, i, None, 0) for i in (0, 1)]
     one, several = (list(duet_features(prior, net, both, steps=3, batch_size=n)) for n in (1, 8))
     for (a, stands), (b, others) in zip(one, several, strict=True):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-4)
@@ -119,7 +119,7 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
 def test_only_who_listens_hears_the_prompt_of_the_other(prior: Prior, block: PairBlock) -> None:
     changed = [SEGMENTS[0], replace(SEGMENTS[1], text="a person turns :: a person walks left"), SEGMENTS[2]]
     for one, deaf in ((block, False), (block_of(prior, fresh=True), True)):
-        rows = [[tasks._asked(some, i, None, 0) for i in (0, 1)] for some in (SEGMENTS, changed)]
+        rows = [[tasks._segments_of(some, i, None, 0) for i in (0, 1)] for some in (SEGMENTS, changed)]
         first, second = (
             np.concatenate([p[0] for p, _ in duet_features(prior, one.net(prior), r, steps=3)]) for r in rows
         )
@@ -158,14 +158,14 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
         return None
 
     monkeypatch.setattr(PairSession, "__call__", constant)
-    monkeypatch.setattr(tasks._PairDenoiser, "_moved", led)
+    monkeypatch.setattr(tasks._PairDenoiser, "_with_pose_guidance", led)
     monkeypatch.setattr(tasks, "relative_pose_guidance", guidance)
     segments = [
         Segment("a person walks", 1.0, transition=0.4),
         Segment("a person turns :: a person jumps", 0.8, transition=0.6),
         Segment("a person walks", 1.1),
     ]
-    both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
+    both = [tasks._segments_of(segments, i, None, 0) for i in (0, 1)]
     both[1][0] = replace(both[1][0], goal=Goal.nothing(20))  # which asks for nothing
     pieces = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.7))
     motion = np.concatenate([piece for piece, _ in pieces], axis=1).astype(np.float64)
@@ -213,10 +213,10 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
 
     monkeypatch.setattr(PairSession, "__call__", constant)
     segments = [Segment("a person walks", 4.0, transition=1.0)] * 3
-    both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
+    both = [tasks._segments_of(segments, i, None, 0) for i in (0, 1)]
     if asked is not None:
         goal = Goal.nothing(80)
-        goal.asked[0, 0, 1], goal.positions[0, 0, 1] = True, 0.9  # what he does anyway
+        goal.mask[0, 0, 1], goal.positions[0, 0, 1] = True, 0.9  # what he does anyway
         both[asked] = [replace(segment, goal=goal) for segment in both[asked]]
     for together, far in ((0.0, (3.0, 4.0)), (1.0, (0.0, 0.8))):
         drawn = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=together))
@@ -241,7 +241,7 @@ def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Pri
     denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0, True)
     state, motion = normal((2, 2, 30, 263), 0)
     begin = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    assert np.array_equal(denoiser._moved(row, 50, motion, begin, state=state), motion + 1)
+    assert np.array_equal(denoiser._with_pose_guidance(row, 50, motion, begin, state=state), motion + 1)
     assert asked["level"] == 50
     assert np.array_equal(asked["state"], join(block.config.places.encode(begin), state))
     assert np.array_equal(asked["clean"], join(block.config.places.encode(begin), motion))
@@ -262,7 +262,7 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     monkeypatch.setattr(PairSession, "__call__", constant)
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
-    path.asked[:, 0] = [True, False, True]
+    path.mask[:, 0] = [True, False, True]
     made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)))
     off = np.linalg.norm((made[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
     assert off.mean() < 0.03
@@ -288,9 +288,9 @@ def test_guesses_go_where_their_person_is_asked_to_be(
         return join(x[:, 0, :4], motion)
 
     monkeypatch.setattr(PairSession, "__call__", constant)
-    both = [tasks._asked([Segment("a person walks", 2.0)], i, None, 0) for i in (0, 1)]
+    both = [tasks._segments_of([Segment("a person walks", 2.0)], i, None, 0) for i in (0, 1)]
     goal = Goal.nothing(40)
-    goal.asked[39, 0, 0], goal.positions[39, 0, 0] = True, 0.3
+    goal.mask[39, 0, 0], goal.positions[39, 0, 0] = True, 0.3
     both[1] = [replace(both[1][0], goal=goal)]
     [(piece, _)] = duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.0)
     first, second = two.along(piece.astype(np.float64))[:, 39, 2]

@@ -17,9 +17,9 @@ from motionloom.retarget.onto import match_root
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.edit import Extend, Loop, Redraw, changes_asked, edit, kept_numbers
+from motionloom.tasks.edit import Extend, Loop, Redraw, changes_from_options, edit, kept_feature_mask
 from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.splice import carried, kept_parts, person_at_20, splice, standing
+from motionloom.tasks.splice import ground_pose_at, kept_parts, move_rigidly, person_at_20, splice
 from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
@@ -112,9 +112,9 @@ def test_the_root_alone_can_be_kept(prior: Prior) -> None:
 
 def test_the_numbers_of_kept_parts_are_the_published_masks() -> None:
     """`lower_body` here is `lower_body` of the control models, and a wrist adds its rotation and displacement."""
-    np.testing.assert_array_equal(kept_numbers(["lower_body"]), humanml.mask("lower_body"))
-    assert kept_numbers(["left_wrist"]).sum() == 3 + 6 + 3
-    assert not kept_numbers([]).any()
+    np.testing.assert_array_equal(kept_feature_mask(["lower_body"]), humanml.mask("lower_body"))
+    assert kept_feature_mask(["left_wrist"]).sum() == 3 + 6 + 3
+    assert not kept_feature_mask([]).any()
 
 
 def test_a_stretch_arrives_where_the_clip_goes_on() -> None:
@@ -204,7 +204,7 @@ def speeds(motion: Motion) -> np.ndarray:
 def test_a_splice_leaves_neither_a_jump_nor_a_kink() -> None:
     """A pose 0.2 rad and 10 cm away, turning at another rate, is met within the fastest step of either motion."""
     clip = person(4.0, 60.0)
-    other = carried(person(4.0, 60.0), rot.rotvec_to_quat(np.array([0, 0.2, 0])), clip.root[0], clip.root[0] + 0.1)
+    other = move_rigidly(person(4.0, 60.0), rot.rotvec_to_quat(np.array([0, 0.2, 0])), clip.root[0], clip.root[0] + 0.1)
     made = splice(clip, other, 90, last=160, kept=kept_parts(SMPL22, frozenset(), np.zeros(3, bool)))
     steps = np.linalg.norm(np.diff(made.positions(), axis=0), axis=-1).max(axis=1)
     bends = np.linalg.norm(np.diff(made.positions(), n=2, axis=0), axis=-1).max(axis=1)
@@ -300,13 +300,13 @@ def test_standing_tells_the_facing() -> None:
     """A person who faces +X stands turned a quarter about +Y."""
     clip = person(1.0)
     clip.rotations[:, 0] = rot.rotvec_to_quat(np.array([0, np.pi / 2, 0]))
-    assert standing(clip, 0).facing == pytest.approx(np.pi / 2, abs=1e-6)
+    assert ground_pose_at(clip, 0).facing == pytest.approx(np.pi / 2, abs=1e-6)
 
 
 def asked_and_edited(prior: Prior, asked: dict) -> None:
     """Changes by single options, as the command line and the server ask for them."""
     options = {key: asked[key] for key in asked if key in ("keep", "between", "loop", "extend", "strength", "blend")}
-    changes = changes_asked(asked.get("text", ""), **options)
+    changes = changes_from_options(asked.get("text", ""), **options)
     edit(prior, person(3.0), changes=changes, **{key: asked[key] for key in asked if key not in options})
 
 

@@ -16,7 +16,7 @@ from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.long import Past, compose, compose_takes, long_features
-from motionloom.tasks.splice import carried
+from motionloom.tasks.splice import move_rigidly
 from motionloom.tasks.text import sample_features
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
@@ -51,7 +51,7 @@ def whole(prior: Prior, segments, **more) -> Motion:
 def on_ground(points: np.ndarray) -> Goal:
     """A path through x and z of the pelvis in every frame."""
     goal = Goal.nothing(len(points))
-    goal.positions[:, 0, ::2], goal.asked[:, 0, ::2] = points, True
+    goal.positions[:, 0, ::2], goal.mask[:, 0, ::2] = points, True
     return goal
 
 
@@ -180,8 +180,8 @@ def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(pri
 def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) -> None:
     """The root of the second segment is asked 0.3 m to the left of and ahead of where it begins, a second later."""
     goal = Goal.nothing(40)
-    goal.positions[20, 0, ::2], goal.asked[20, 0, ::2] = (0.3, 0.5), True
-    clip = carried(person(2.0), np.array([np.cos(facing / 2), 0, np.sin(facing / 2), 0]), np.zeros(3), np.zeros(3))
+    goal.positions[20, 0, ::2], goal.mask[20, 0, ::2] = (0.3, 0.5), True
+    clip = move_rigidly(person(2.0), np.array([np.cos(facing / 2), 0, np.sin(facing / 2), 0]), np.zeros(3), np.zeros(3))
     segments = [Segment(TURN, 2.0), Segment(WALK, 2.0, goal=goal), Segment(TURN, 2.0)]
     calm = prior.std.copy()
     calm[:3] = 0.001  # the neighbours do not know the goal, and what they draw of the overlaps counts
@@ -213,7 +213,7 @@ def test_a_path_is_followed_to_its_end(prior: Prior) -> None:
 def test_a_motion_goes_on_where_a_clip_ends(prior: Prior, turn: float) -> None:
     """A clip at 30 fps elsewhere, facing anywhere: next place and velocity are what the clip's last frames lead to."""
     quaternion = np.array([np.cos(turn / 2), 0, np.sin(turn / 2), 0])
-    clip = carried(person(61 / 30, 30.0), quaternion, np.zeros(3), np.array([4.0, 0, -7.0]))
+    clip = move_rigidly(person(61 / 30, 30.0), quaternion, np.zeros(3), np.array([4.0, 0, -7.0]))
     assert len(clip) == 61  # two seconds: frames 0, 3, 6, ... are frames at 20 fps
     made = whole(prior, [Segment(WALK, 2.0)], start=clip, foot_lock=False)
     old, new = to_smpl22(clip).resample(20).positions(), made.positions()  # which stands on the floor

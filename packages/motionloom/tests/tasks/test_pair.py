@@ -25,7 +25,7 @@ from motionloom.tasks.pair import (
     pair_features,
     person_seeds,
 )
-from motionloom.tasks.people import Pasts, known_state
+from motionloom.tasks.people import PairPast, known_state
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import finish, sample_features
 from motionloom.weights.pair import PairBlock
@@ -175,7 +175,7 @@ def walk(frames: int) -> Goal:
     goal = Goal.nothing(frames)
     angle = np.linspace(0, np.pi / 2, frames)
     goal.positions[:, 0] = np.stack([1 + 1.3 * np.sin(angle), 0 * angle, 3.3 - 1.3 * np.cos(angle)], axis=-1)
-    goal.asked[:, 0] = [True, False, True]
+    goal.mask[:, 0] = [True, False, True]
     return replace(goal, start=GroundPose(1.0, 2.0, np.pi / 2))
 
 
@@ -221,11 +221,11 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
 
 
 def test_one_ground_for_two_bodies_is_undone(prior: Prior) -> None:
-    pasts = Pasts.of(walkers(1.2))
+    pasts = PairPast.of(walkers(1.2))
     alone = [to_smpl22(motion).positions() for motion in pasts.motions]
     common = one_world(alone, pasts.legs)
     for i in (0, 1):
-        np.testing.assert_allclose(pasts.own(i, common[i]), alone[i], atol=1e-9)
+        np.testing.assert_allclose(pasts.to_own_scale(i, common[i]), alone[i], atol=1e-9)
     assert np.abs(common[0] - alone[0]).max() > 0.01
 
 
@@ -250,8 +250,8 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
     past = tuple(motion.frames(0, count) for motion in whole)
 
     def true(prior, net, said, frames, **_):
-        legs = Pasts.of(whole).legs
-        seen = Pasts.of((past[0], past[1])).known.features.shape[1]
+        legs = PairPast.of(whole).legs
+        seen = PairPast.of((past[0], past[1])).known.features.shape[1]
         at = count - 1 + (np.arange(frames + 1) - (seen - 1)) / 20 * whole[0].fps
         uniform = one_world([to_smpl22(motion).positions() for motion in whole], legs)
         encoded = two.encode(np.stack([positions_at(person, at) for person in uniform]))

@@ -14,7 +14,7 @@ from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
 from motionloom.tasks.predict import predict, predict_pieces, switch
-from motionloom.tasks.splice import concatenated, standing
+from motionloom.tasks.splice import concatenate, ground_pose_at
 from motionloom.tasks.windows import Past, WindowSampler
 from tests.recorded import tiny_predictor
 from tests.shared import shared
@@ -127,13 +127,13 @@ def test_a_person_takes_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At the predictor's own rate a frame of the grid is a frame of the result."""
-    given, apply = [], task.continued
+    given, apply = [], task.continue_motion
 
     def continued(tail, places, **asked):
         given.append((places, len(tail)))
         return apply(tail, places, **asked)
 
-    monkeypatch.setattr(task, "continued", continued)
+    monkeypatch.setattr(task, "continue_motion", continued)
     predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
     ((places, known),) = given
     seen = Past.of(PREDICTOR, PAST).person
@@ -161,7 +161,7 @@ def test_future_i_is_the_same_alone_among_others_and_in_pieces() -> None:
     few = predict(PREDICTOR, PAST, count=2, **asked)
     pieces = list(predict_pieces(PREDICTOR, PAST, number=2, **asked))
     assert same(pieces[0], PAST)
-    close(concatenated(*pieces), many[2])
+    close(concatenate(*pieces), many[2])
     for i in (0, 1):
         close(few[i], many[i])
     (last,) = predict(PREDICTOR, PAST, count=1, first=2, **asked)
@@ -178,7 +178,7 @@ def test_a_long_future_comes_in_pieces_without_seams_between_them(monkeypatch: p
     monkeypatch.setattr(task, "CHUNK", 3.0)
     pieces = list(predict_pieces(PREDICTOR, PAST, seconds=8.5, steps=1))
     assert [len(piece) for piece in pieces] == [30, 90, 90, 75]
-    whole = concatenated(*pieces)
+    whole = concatenate(*pieces)
     places, at = joints22(whole), np.cumsum([len(p) for p in pieces])[:-1]
     bend = np.linalg.norm(np.diff(places, 2, axis=0), axis=-1).max(-1)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=-1).max(-1)
@@ -213,7 +213,7 @@ def test_without_a_temperature_every_seed_makes_the_same() -> None:
     asked = {"seconds": 0.5, "steps": 2, "temperature": 0.0}
     first, second = predict(PREDICTOR, PAST, count=2, **asked)
     close(first, second)
-    close(concatenated(*predict_pieces(PREDICTOR, PAST, seed=7, **asked)), first)
+    close(concatenate(*predict_pieces(PREDICTOR, PAST, seed=7, **asked)), first)
     one, other = switch(PREDICTOR, PAST, PAST, count=2, **asked | {"seconds": 1.2})
     close(one, other)
 
@@ -229,7 +229,7 @@ def test_without_its_way_a_person_comes_to_a_stop_and_stays_in_place() -> None:
     level = made.root[:, [0, 2]]
     assert np.linalg.norm(level[-1] - level[45]) < 0.05
     assert np.linalg.norm(level[-1] - level[29]) < 0.25
-    close(concatenated(*predict_pieces(PREDICTOR, PAST, seconds=2.0, steps=2, root=False)), made)
+    close(concatenate(*predict_pieces(PREDICTOR, PAST, seconds=2.0, steps=2, root=False)), made)
     free = predict(PREDICTOR, PAST, **FEW | {"seconds": 2.0})[0]
     assert np.linalg.norm((free.root - made.root)[-1]) > 0.02
 
@@ -248,10 +248,10 @@ def test_a_target_comes_back_bit_for_bit_but_for_a_rigid_move_on_the_ground(body
     assert np.array_equal(tail.rotations[:, joints], target.rotations[:, joints])
     here, there = joints22(tail), joints22(target)
     np.testing.assert_allclose(here[..., 1], there[..., 1], atol=1e-9)
-    turn = standing(tail, 0).facing - standing(target, 0).facing
+    turn = ground_pose_at(tail, 0).facing - ground_pose_at(target, 0).facing
     np.testing.assert_allclose(here - here[:1, :1], turned(there - there[:1, :1], turn), atol=1e-9)
-    wanted = standing(past, 29) if facing == "turned" else standing(target, 0)
-    assert standing(tail, 0).apart(wanted)[1] < (0.35 if facing == "turned" else 1e-9)
+    wanted = ground_pose_at(past, 29) if facing == "turned" else ground_pose_at(target, 0)
+    assert ground_pose_at(tail, 0).apart(wanted)[1] < (0.35 if facing == "turned" else 1e-9)
 
 
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 24.0), (0.1, 120.0), (0.5, 30.0), (1.0, 24.0), (2.6, 30.0)])

@@ -14,8 +14,8 @@ from motionloom.kinematics.feet import planted_feet
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.long import compose
-from motionloom.tasks.redraw import Block, Run, Timed, blocks_from, redrawn, runs_of
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.redraw import Block, Run, Timed, blocks_from, changed_runs, resample_runs
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny
@@ -39,15 +39,15 @@ def timed(prior: Prior, segments, path: Goal | None = None, **settings: Any) -> 
 
 
 def drawn(asked: Timed) -> Motion:
-    return concatenated(*compose(asked.prior, asked.segments, path=asked.path, sampling=asked.sampling))
+    return concatenate(*compose(asked.prior, asked.segments, path=asked.path, sampling=asked.sampling))
 
 
 def changed(before: Timed, after: Timed, old: Motion | None = None) -> tuple[Motion, Motion, list[int]]:
     """The motion before, the one after, and how many rows were moved at a time."""
     old, moves = old or drawn(before), []
-    runs = runs_of(before.blocks, after)
+    runs = changed_runs(before.blocks, after)
     assert runs is not None
-    return old, redrawn(after, old, before.blocks, runs, moves.append), moves
+    return old, resample_runs(after, old, before.blocks, runs, moves.append), moves
 
 
 def with_words(number: int, text: str) -> list[Segment]:
@@ -57,7 +57,7 @@ def with_words(number: int, text: str) -> list[Segment]:
 def straight(frames: int) -> Goal:
     """A path along +Z, a place for every frame."""
     goal = Goal.nothing(frames)
-    goal.positions[:, 0, 2], goal.asked[:, 0, ::2] = 0.03 * np.arange(frames), True
+    goal.positions[:, 0, 2], goal.mask[:, 0, ::2] = 0.03 * np.arange(frames), True
     return goal
 
 
@@ -133,35 +133,35 @@ def test_what_has_to_be_sampled_is_told_by_what_is_asked(prior: Prior) -> None:
     """Words, length, guidance, seed, steps and goals; a transition is that of one seam alone."""
     before = timed(prior, SEGMENTS)
     reach = Goal.nothing(40)
-    reach.positions[20, 20], reach.asked[20, 20] = (0.2, 1.4, 0.3), True
+    reach.positions[20, 20], reach.mask[20, 20] = (0.2, 1.4, 0.3), True
     one = SEGMENTS[1]
     others = [replace(one, text="a"), replace(one, seconds=1.5), replace(one, guidance=4.0), replace(one, goal=reach)]
     for other in others:
         segments = [SEGMENTS[0], other, *SEGMENTS[2:]]
-        assert runs_of(before.blocks, timed(prior, segments)) == [Run(1, 2, 1, 2)]
+        assert changed_runs(before.blocks, timed(prior, segments)) == [Run(1, 2, 1, 2)]
     seam = [*SEGMENTS[:1], replace(SEGMENTS[1], transition=0.4), *SEGMENTS[2:]]
-    assert runs_of(before.blocks, timed(prior, seam)) == [Run(2, 2, 2, 2)]
+    assert changed_runs(before.blocks, timed(prior, seam)) == [Run(2, 2, 2, 2)]
     for another in (timed(prior, SEGMENTS, seed=1), timed(prior, SEGMENTS, guidance=1.0)):
-        assert runs_of(before.blocks, another) is None
-    assert runs_of(before.blocks, timed(prior, SEGMENTS, steps=4)) is None
-    assert runs_of(before.blocks, replace(before, foot_lock=False)) is None
+        assert changed_runs(before.blocks, another) is None
+    assert changed_runs(before.blocks, timed(prior, SEGMENTS, steps=4)) is None
+    assert changed_runs(before.blocks, replace(before, foot_lock=False)) is None
     other = replace(prior, net=tiny.prior(tiny.PUBLISHED).net)
-    assert runs_of(before.blocks, timed(other, SEGMENTS)) is None
+    assert changed_runs(before.blocks, timed(other, SEGMENTS)) is None
 
 
 def test_a_neighbour_that_is_asked_for_something_at_the_seam_is_sampled_too(prior: Prior) -> None:
     for frame, runs in ((3, [Run(2, 4, 2, 4)]), (25, [Run(2, 3, 2, 3)])):
         reach = Goal.nothing(40)
-        reach.positions[frame, 20], reach.asked[frame, 20] = (0.2, 1.4, 0.3), True
+        reach.positions[frame, 20], reach.mask[frame, 20] = (0.2, 1.4, 0.3), True
         segments = [*SEGMENTS[:3], replace(SEGMENTS[3], goal=reach), SEGMENTS[4]]
         before = timed(prior, segments)
         after = timed(prior, [replace(one, text="a") if n == 2 else one for n, one in enumerate(segments)])
-        assert runs_of(before.blocks, after) == runs
+        assert changed_runs(before.blocks, after) == runs
 
 
 def test_a_goal_of_a_block_is_met_where_it_is_drawn_again(prior: Prior) -> None:
     reach = Goal.nothing(40)
-    reach.positions[20, 0], reach.asked[20, 0, ::2] = (0.3, 0.0, 0.4), True
+    reach.positions[20, 0], reach.mask[20, 0, ::2] = (0.3, 0.0, 0.4), True
     segments = [*SEGMENTS[:2], replace(SEGMENTS[2], goal=reach), *SEGMENTS[3:]]
     _, new, _ = changed(timed(prior, SEGMENTS), timed(prior, segments))
     away = new.root[100, ::2] - new.root[80, ::2]
@@ -178,7 +178,7 @@ def test_on_a_path_what_lies_behind_stays_in_its_place(prior: Prior) -> None:
     assert off.max() < 0.06
     bent = replace(path, positions=path.positions.copy())
     bent.positions[130:150, 0, 0] += 0.1
-    assert runs_of(timed(prior, SEGMENTS, path).blocks, timed(prior, SEGMENTS, bent)) == [Run(3, 4, 3, 4)]
+    assert changed_runs(timed(prior, SEGMENTS, path).blocks, timed(prior, SEGMENTS, bent)) == [Run(3, 4, 3, 4)]
 
 
 def test_what_is_sampled_is_seen_at_its_time(prior: Prior) -> None:

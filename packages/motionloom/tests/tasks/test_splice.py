@@ -7,7 +7,7 @@ from scipy.interpolate import BPoly
 from motionloom import rotations as rot
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.splice import Kept, splice
+from motionloom.tasks.splice import KeptParts, splice
 from tests.tasks.test_edit import person
 
 OLD = person(2.0, 30.0)
@@ -18,7 +18,7 @@ def test_outside_of_a_stretch_and_in_kept_parts_nothing_changes(first: int, last
     turn = rot.rotvec_to_quat(np.array([0.2, 0.1, -0.3]))
     made = Motion(SMPL22, 30.0, OLD.root + np.array([0.3, 0.1, -0.2]), rot.multiply(OLD.rotations, turn))
     joints, place = np.arange(22) % 3 == 1, np.array([True, False, True])
-    result = splice(OLD, made, first, last=last, kept=Kept(joints, place))
+    result = splice(OLD, made, first, last=last, kept=KeptParts(joints, place))
     inside = (np.arange(60) >= first) & (np.arange(60) < last)
     assert np.array_equal(result.rotations[~inside], OLD.rotations[~inside])
     assert np.array_equal(result.root[~inside], OLD.root[~inside])
@@ -35,7 +35,7 @@ def test_a_constant_difference_fades_from_the_border_and_is_gone_behind_it() -> 
     turns = OLD.rotations.copy()
     turns[:, 15] = rot.multiply(turns[:, 15], rot.rotvec_to_quat(np.array([0, angle, 0])))
     made = Motion(SMPL22, 30.0, OLD.root, turns)
-    result = splice(OLD, made, 20, last=60, kept=Kept(np.zeros(22, dtype=bool), np.zeros(3, dtype=bool)))
+    result = splice(OLD, made, 20, last=60, kept=KeptParts(np.zeros(22, dtype=bool), np.zeros(3, dtype=bool)))
     apart = rot.multiply(rot.inverse(OLD.rotations[20:, 15]), result.rotations[20:, 15])
     away = np.linalg.norm(rot.quat_to_rotvec(apart), axis=-1)
     ease = 9

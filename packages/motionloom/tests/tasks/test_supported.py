@@ -10,7 +10,7 @@ from motionloom.kinematics.physics import WRISTS, J
 from motionloom.kinematics.stairs import hovering, stairs
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.supported import supported
+from motionloom.tasks.supported import add_support
 
 FPS = 20.0
 
@@ -34,7 +34,7 @@ def climbing(*heights: float, seconds: float = 1.0) -> Motion:
 
 @pytest.mark.parametrize("heights", [(0, 0.2, 0.33, 0.55, 0.66), (0, 0.4, 0.9, 1.3), (0.7, 0.5, 0.36, 0.19, 0)])
 def test_feet_come_onto_steps_of_one_height_one_after_the_other(heights: tuple[float, ...]) -> None:
-    made = supported(climbing(*heights))
+    made = add_support(climbing(*heights))
     found = stairs(made.positions(), FPS)
     assert found is not None
     assert 0.14 < found.rise < 0.21
@@ -48,11 +48,11 @@ def test_who_hovers_comes_down_and_who_stands_or_sits_high_stays() -> None:
     """Rising without a foothold for longer than a jump; a jump and a seat above the floor are left alone."""
     rising = lifted(np.arange(60) / FPS)
     assert hovering(rising.positions(), FPS)
-    assert not hovering(supported(rising).positions(), FPS)
+    assert not hovering(add_support(rising).positions(), FPS)
     t = np.arange(60) / FPS
     jump = lifted(np.maximum(0.0, 2.5 * (t - 1) - 9.81 / 2 * (t - 1) ** 2) * (t > 1))
     for other in (jump, lifted(np.zeros(60)), lifted(np.full(60, 0.3))):
-        assert supported(other) is other
+        assert add_support(other) is other
 
 
 def test_hands_come_out_of_the_floor() -> None:
@@ -65,4 +65,4 @@ def test_hands_come_out_of_the_floor() -> None:
     root[:, 1] = 0.15
     lying = replace(lying, root=root, rotations=rotations)
     assert lying.positions()[:, WRISTS[0], 1].max() < -0.05
-    assert supported(lying).positions()[:, WRISTS, 1].min() > 0.0
+    assert add_support(lying).positions()[:, WRISTS, 1].min() > 0.0

@@ -13,7 +13,7 @@ from motionloom.motion import Motion
 from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.runtime.text.published import PublishedText
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.supported import supported
+from motionloom.tasks.supported import add_support
 from motionloom.tasks.text import finish, generate, sample_features, to_motion
 from motionloom.weights.prior import Prior, load_prior, save_prior
 from tests.noise import normal
@@ -173,7 +173,7 @@ def test_a_walk_of_263_numbers_is_put_on_the_floor() -> None:
     prior = tiny.prior()
     features = sample_features(prior, ["a person walks"], [12], seeds=[0], steps=2)[0]
     wanted = to_motion(features.astype(np.float64), 20.0)
-    np.testing.assert_array_equal(finish(prior, features).positions(), supported(wanted).positions())
+    np.testing.assert_array_equal(finish(prior, features).positions(), add_support(wanted).positions())
     raw = to_motion(features.astype(np.float64), 20.0, foot_lock=False)
     np.testing.assert_array_equal(finish(prior, features, foot_lock=False).positions(), raw.positions())
 

@@ -6,7 +6,7 @@ import pytest
 from motionloom import Predictor, Prior, Redraw, Segment, compose, edit, generate, predict
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.pair import generate_pair
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.pair import PairBlock
 
@@ -44,9 +44,7 @@ def test_nothing_is_reported_outside_of_the_block(prior: Prior) -> None:
 def test_a_long_motion_is_shown_from_end_to_end(prior: Prior) -> None:
     seen: list[Denoised] = []
     with watching(seen.append):
-        motion = concatenated(
-            *compose(prior, [Segment("a person walks", 2.0), Segment("a person jumps", 1.5)], steps=6)
-        )
+        motion = concatenate(*compose(prior, [Segment("a person walks", 2.0), Segment("a person jumps", 1.5)], steps=6))
     assert [one.done for one in seen] == list(range(1, 7))
     poses = seen[-1].positions()
     assert poses.shape == (1, 1, 70, 22, 3)
@@ -96,7 +94,7 @@ def test_a_long_duet_is_shown_from_end_to_end_in_one_world(prior: Prior) -> None
     assert [one.done for one in seen] == list(range(1, 7))
     assert poses.shape == (1, 2, 60, 22, 3)
     for shown, blocks in zip(poses[0], zip(*pieces, strict=True), strict=True):  # 6 steps: hands are still on their way
-        assert np.linalg.norm(shown - concatenated(*blocks).positions(), axis=-1).mean() < 0.2
+        assert np.linalg.norm(shown - concatenate(*blocks).positions(), axis=-1).mean() < 0.2
 
 
 def test_an_exception_of_the_callback_ends_the_drawing_at_that_network_call(prior: Prior) -> None:

@@ -12,7 +12,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import windows
 from motionloom.tasks.completion import next_frames
-from motionloom.tasks.windows import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, windows_for
+from motionloom.tasks.windows import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, window_count
 from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
 
@@ -57,7 +57,7 @@ def test_a_predictor_that_sees_longer_than_floors_need_sees_all_of_it() -> None:
 
 @pytest.mark.parametrize(("seconds", "count"), [(0.01, 1), (0.999, 1), (1.0 + 1e-9, 1), (1.01, 2), (7.5, 8)])
 def test_as_many_windows_as_the_seconds_need(seconds: float, count: int) -> None:
-    assert windows_for(PREDICTOR, seconds) == count
+    assert window_count(PREDICTOR, seconds) == count
 
 
 def test_each_window_sees_the_one_before() -> None:

@@ -27,10 +27,10 @@ def test_it_is_drawn_again_until_the_number_is_right(prior: Prior, monkeypatch: 
         drawn.append((asked.seconds, sampling.seed))
         return generate(prior, "a person stands", seconds=1.0, steps=1)[0]
 
-    monkeypatch.setattr(worded, "_drawn", draw_one)
+    monkeypatch.setattr(worded, "_sample_timeline", draw_one)
     monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
     asked = worded.read(prior, "a person jumps twice")
-    (made,) = worded.draw(prior, [asked], seeds=[5])
+    (made,) = worded.generate_timelines(prior, [asked], seeds=[5])
     assert [one.measured for one in made.amounts] == [2]
     assert made.amounts[0].kept
     assert not made.amounts[0].problem
@@ -42,9 +42,9 @@ def test_it_is_drawn_again_until_the_number_is_right(prior: Prior, monkeypatch: 
 def test_the_nearest_is_kept_and_told(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
     counts = iter([7, 1, 4, 4, 5, 6])
     still = generate(prior, "a person stands", seconds=1.0, steps=1)[0]
-    monkeypatch.setattr(worded, "_drawn", lambda *_: still)
+    monkeypatch.setattr(worded, "_sample_timeline", lambda *_: still)
     monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
-    (made,) = worded.draw(prior, [worded.read(prior, "a person jumps three times")], seeds=[0])
+    (made,) = worded.generate_timelines(prior, [worded.read(prior, "a person jumps three times")], seeds=[0])
     assert made.amounts[0].measured == 4
     assert made.amounts[0].problem == "3 jumps asked; 4 jumps drawn"
 

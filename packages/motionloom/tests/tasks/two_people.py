@@ -9,7 +9,7 @@ from motionloom import rotations as rot
 from motionloom.io import load
 from motionloom.motion import Motion
 from motionloom.runtime.shapes import pair_shapes
-from motionloom.tasks.splice import carried
+from motionloom.tasks.splice import move_rigidly
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -38,4 +38,6 @@ def walkers(seconds: float, *, larger: float = 1.2, beside: float = 1.5, later: 
     grown = Motion(bones, second.fps, second.root * larger, second.rotations)
     turn = rot.rotvec_to_quat(np.array([0.0, 0.3, 0.0]))
     level = np.array([1.0, 0.0, 1.0])
-    return clip.frames(0, count), carried(grown, turn, grown.root[0] * level, clip.root[0] * level + [beside, 0, 0])
+    return clip.frames(0, count), move_rigidly(
+        grown, turn, grown.root[0] * level, clip.root[0] * level + [beside, 0, 0]
+    )

@@ -5,7 +5,7 @@ import { Network, type Runtime as Built } from "../../../src/prior/network";
 import { REST as OFFSETS } from "../../../src/prior/person";
 import { Prior as Sampler, flat, sketched } from "../../../src/prior/prior";
 import { type Take, type Viewer, spoken } from "../../../src/prior/spoken";
-import { reading } from "../../../src/prior/wanted";
+import { reading } from "../../../src/prior/amounts";
 import { type Manifest, Packed } from "../../../src/prior/weights";
 import { bvh } from "../../../src/tab/bvh";
 import { LARGEST, LETTERS, LONGEST, MOST, SHORTEST, SHORTEST_OF_SEVERAL } from "../../../src/tab/link";

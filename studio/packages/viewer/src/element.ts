@@ -6,7 +6,7 @@
  */
 
 import { h } from "../../../src/app/dom";
-import { parsed } from "../../../src/stage/actor";
+import { parseGltf } from "../../../src/stage/actor";
 import buttons from "../../../src/style/buttons.css?inline";
 import colors from "../../../src/style/colors.css?inline";
 import { takesOfFile } from "../../../src/viewer/data";
@@ -87,7 +87,7 @@ export class MotionloomViewer extends HTMLElement {
     try {
       const answer = await fetch(new URL(src, document.baseURI), { signal });
       if (!answer.ok) throw new Error(`${src} is answered with ${answer.status}`);
-      const takes = takesOfFile(await parsed(await answer.arrayBuffer()));
+      const takes = takesOfFile(await parseGltf(await answer.arrayBuffer()));
       if (signal.aborted) return;
       if (takes.length === 0) throw new Error(`${src} has no animation`);
       const isCalm = this.hasAttribute("paused") || matchMedia("(prefers-reduced-motion: reduce)").matches;

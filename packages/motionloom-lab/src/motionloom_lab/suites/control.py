@@ -144,13 +144,13 @@ def _judged(trial: ControlTrial, replication: int, embedded: Array) -> dict[str,
 def met(made: Sequence[Made], targets: Sequence[Target], scale: np.ndarray) -> dict[str, float]:
     """How far the motions are from what was asked: cm, shares, degrees, standard deviations."""
     pairs = list(zip(made, targets, strict=True))
-    apart = [metrics.distances(one.positions, target.goal.positions, target.goal.asked) for one, target in pairs]
+    apart = [metrics.distances(one.positions, target.goal.positions, target.goal.mask) for one, target in pairs]
     root, joints, both = metrics.of_root(apart), metrics.of_joints(apart), metrics.control_error(apart)
     found = {**_error("root", root), **_error("joint", joints)}
     if both is not None:
         found |= {"worst": both.worst, "beyond_20": both.beyond_20, "beyond_50": both.beyond_50}
     turns = [
-        metrics.facing_error(one.positions, target.goal.positions, target.goal.facing_asked) for one, target in pairs
+        metrics.facing_error(one.positions, target.goal.positions, target.goal.facing_mask) for one, target in pairs
     ]
     found["facing"] = float(np.mean(every)) if (every := np.concatenate(turns)).size else math.nan
     found["feature_error"] = metrics.feature_error(

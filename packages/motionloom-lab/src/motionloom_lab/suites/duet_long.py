@@ -13,7 +13,7 @@ from motionloom.motion import Motion
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose
 from motionloom.tasks.people import Duet
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -116,4 +116,4 @@ def timeline(captions: Sequence[str], caption: str, how: LongDuetSettings) -> li
 
 
 def _whole(pieces: Iterable[Motion]) -> Motion:
-    return concatenated(*pieces)
+    return concatenate(*pieces)

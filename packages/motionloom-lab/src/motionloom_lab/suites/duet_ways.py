@@ -117,7 +117,7 @@ def sampled(
         worlds = [visible_part(crop, given) for crop in crops.positions]
         known = PairMotion.stack([two.encode(world) for world in worlds])
         people = [person for one in known.features for person in one]
-        leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]
+        leaving = [Past(person, GroundPose()).start_correction(prior, FRAMES) for person in people]
         sampled = make(
             prior,
             net,

@@ -10,7 +10,7 @@ from motionloom.goals.sequence import split_actions
 from motionloom.goals.timeline import timeline_of
 from motionloom.kinematics.physics import Array
 from motionloom.tasks.long import compose
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
 from motionloom_lab.suites.harness import Generate
@@ -49,7 +49,7 @@ def generator(
     def several(prompt: str, seconds: float, seed: int) -> Array:
         segments = timeline_of(prompt, seconds).segments
         settings = {name: value for name, value in how.items() if name != "solver"}
-        return concatenated(*compose(prior, segments, seed=seed, **settings)).positions()  # type: ignore[arg-type]
+        return concatenate(*compose(prior, segments, seed=seed, **settings)).positions()  # type: ignore[arg-type]
 
     def make(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
         whole = [not long or len(split_actions(prompt)) == 1 for prompt in prompts]

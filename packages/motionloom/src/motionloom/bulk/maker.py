@@ -14,13 +14,13 @@ from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.roles import prompts_of
 from motionloom.io import load
 from motionloom.motion import Motion
-from motionloom.requests.reading import make
+from motionloom.requests.reading import build_request
 from motionloom.requests.sampling import PairSampling, Sampling
 from motionloom.requests.tasks import REQUESTS
 from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.control import Controlled, judged
+from motionloom.tasks.control import Controlled, evaluate
 from motionloom.tasks.run import Models, Plan, run, run_each
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features
 from motionloom.weights.container import PAIRS, weights_digest
@@ -274,7 +274,7 @@ class Maker:
             sampling = PairSampling(**vars(sampling), pair_guidance=options.pair_guidance)
         return Plan(
             task=task,
-            values=make(REQUESTS[task], {name: value for name, value in said.items() if value is not None}),
+            values=build_request(REQUESTS[task], {name: value for name, value in said.items() if value is not None}),
             sampling=sampling,
             seconds=asked.frames / self.prior.fps,
             timeline=timeline,
@@ -308,7 +308,7 @@ class Maker:
         measured = measure_two(duet, texts, self.judge)
         if asked.goal is not None:
             person = asked.row.whom
-            measured[person] |= _misses(judged(duet[person], duet[person], asked.goal))
+            measured[person] |= _misses(evaluate(duet[person], duet[person], asked.goal))
         return self._finished(asked, duet, measured)
 
     def _only_ddpm(self, asked: Asked) -> None:

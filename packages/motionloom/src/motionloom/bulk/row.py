@@ -412,9 +412,9 @@ def hash_adapters(adapters: Sequence[tuple[Path, float]]) -> list[str]:
 
 def digest_goal(goal: Goal) -> str:
     """Hash of what a goal asks; what is not asked does not count."""
-    where = np.where(goal.asked, goal.positions, 0.0)
-    facing = np.where(goal.facing_asked, goal.facing, 0.0)
-    return _digest(where, goal.asked, facing, goal.facing_asked, None if goal.start is None else astuple(goal.start))
+    where = np.where(goal.mask, goal.positions, 0.0)
+    facing = np.where(goal.facing_mask, goal.facing, 0.0)
+    return _digest(where, goal.mask, facing, goal.facing_mask, None if goal.start is None else astuple(goal.start))
 
 
 def digest_timeline(timeline: Timeline, start: Motion | None) -> str:

@@ -22,10 +22,10 @@ from motionloom.io.stream import Stream, check_length, open_stream, resampled
 from motionloom.kinematics.deeds import LONGEST
 from motionloom.motion import Motion
 from motionloom.requests.compose import Compose
-from motionloom.requests.reading import settled
-from motionloom.tasks.long import with_loaded
+from motionloom.requests.reading import resolve_sampling
+from motionloom.tasks.long import load_segment_adapters
 from motionloom.tasks.run import Models, Plan
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.weights.prior import Prior
 
 REMARKED = 200
@@ -49,7 +49,7 @@ def run_compose(arguments: argparse.Namespace) -> int:
     check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
-    timeline = replace(timeline, segments=with_loaded(prior, timeline.segments))
+    timeline = replace(timeline, segments=load_segment_adapters(prior, timeline.segments))
     streams = _open(arguments, outs, timeline, target)
     shown: list[Motion] = []
     interrupted = _make(arguments, prior, timeline, streams, shown)
@@ -97,7 +97,7 @@ def _happened(pieces: Sequence[Motion]) -> list[Any]:
     """What the person of these pieces did, if there are any."""
     from motionloom.kinematics.deeds import happened
 
-    return happened([concatenated(*pieces)] if pieces else [])
+    return happened([concatenate(*pieces)] if pieces else [])
 
 
 def _make(
@@ -156,7 +156,7 @@ def _pieces(arguments: argparse.Namespace, prior: Prior, timeline: Timeline) -> 
     plan = Plan(
         task="compose",
         values=values,
-        sampling=settled(values, timeline),
+        sampling=resolve_sampling(values, timeline),
         timeline=timeline,
         start=None if timeline.start is None else load_motion(arguments, timeline.start),
         in_pieces=not arguments.loop,

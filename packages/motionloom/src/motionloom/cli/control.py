@@ -85,7 +85,7 @@ def run_control(arguments: argparse.Namespace) -> int:
 def _note_on_path(goal: Goal, metre: float) -> str:
     """How a path in a robot's metres is walked by the person that is drawn."""
 
-    asked = np.flatnonzero(goal.asked[:, 0, [0, 2]].all(axis=1))
+    asked = np.flatnonzero(goal.mask[:, 0, [0, 2]].all(axis=1))
     if len(asked) < 2:
         return note_on_metres(metre)
     way = float(np.linalg.norm(np.diff(goal.positions[asked, 0][:, [0, 2]], axis=0), axis=1).sum())
@@ -114,7 +114,7 @@ def _goal(arguments: argparse.Namespace, metre: float) -> Goal:
         goals.append(follow(clip, arguments.follow, frames=frames))
     whole = goals[0]
     for other in goals[1:]:
-        if clip is not None and other is goals[-1] and (whole.start is not None or whole.asked[0, 0].any()):
+        if clip is not None and other is goals[-1] and (whole.start is not None or whole.mask[0, 0].any()):
             other = replace(other, start=None)  # the person starts where the goals say, not where the clip's does
         whole = merged(whole, other)
     try:

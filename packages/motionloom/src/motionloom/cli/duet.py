@@ -35,7 +35,7 @@ from motionloom.io.lined_yaml import read_lined
 from motionloom.io.stream import check_length
 from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.duet import Duet
-from motionloom.requests.reading import settled
+from motionloom.requests.reading import resolve_sampling
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
@@ -113,7 +113,7 @@ def _plan(
     return Plan(
         task="duet",
         values=values,
-        sampling=settled(values, timeline),
+        sampling=resolve_sampling(values, timeline),
         seconds=usual if arguments.seconds is None else arguments.seconds,
         timeline=timeline,
         goals=goals,

@@ -23,7 +23,7 @@ from motionloom.io.bvh_writer import save_bvh
 from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.laid import only_head
+from motionloom.tasks.direct_edits import is_only_head_free
 from motionloom.tasks.run import Models, Plan
 
 
@@ -43,7 +43,7 @@ def run_edit(arguments: argparse.Namespace) -> int:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     keep = [name.strip() for part in arguments.keep for name in part.split(",")]
-    remarks = [] if only_head(keep) else remark_unknown(prior, [arguments.text or ""])
+    remarks = [] if is_only_head_free(keep) else remark_unknown(prior, [arguments.text or ""])
     unit, orders = (None, {}) if uniform else (unit, orders)
     made = Finished(
         files,

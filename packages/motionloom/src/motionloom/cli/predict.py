@@ -262,7 +262,7 @@ def _hold(arguments: argparse.Namespace, past: Motion, horizon: int) -> FixedJoi
     late = min(min(begin for begin, _ in part.spans) for part in parts)
     if late >= seconds:
         fail(f"nothing is held before {late:g} s, and the prediction ends at {seconds:g} s; give a longer --seconds")
-    if mask_file.all_held(parts, seconds):
+    if mask_file.fixes_everything(parts, seconds):
         fail("all joints are held all of the time, so that nothing is left to predict; hold fewer")
     source = _like_past(arguments, arguments.source, past)
     skipped = round(arguments.from_time * past.fps)

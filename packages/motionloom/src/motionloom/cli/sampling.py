@@ -18,7 +18,7 @@ from motionloom.io.bvh_writer import save_bvh
 from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.generate import Generate
-from motionloom.requests.reading import make
+from motionloom.requests.reading import build_request
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.run import Models, Plan, Result, run
 from motionloom.weights.prior import Prior
@@ -36,7 +36,7 @@ def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
 def request_of(arguments: argparse.Namespace, request: type[R], own: Mapping[str, Any]) -> R:
     """The request that the line says; own: values of fields that are said otherwise than by an option of their name."""
     said = {name: getattr(arguments, name) for name in specs(request) if hasattr(arguments, name)}
-    return make(request, said | dict(own))
+    return build_request(request, said | dict(own))
 
 
 def results(label: str, plan: Plan, models: Models) -> Iterator[Result]:

@@ -73,7 +73,7 @@ class Bodies:
         features = pair.features.copy()
         for i, goal in enumerate(self.meeting.goals(pair.places())):
             if self.bends[i]:
-                own = goal.seen_from(GroundPose.of_numbers(pair.poses[i]))
+                own = goal.relative_to(GroundPose.of_numbers(pair.poses[i]))
                 standard = (features[i] - prior.mean) / prior.spread
                 features[i] = toward(own, prior)(standard, level) * prior.spread + prior.mean
         return PairMotion(features, pair.poses)

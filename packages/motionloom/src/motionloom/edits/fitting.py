@@ -66,10 +66,10 @@ def fit(motion: Motion, goal: Goal) -> Motion:
         raise MotionloomError("only motions of the 22-joint SMPL person can be fitted to a goal: retarget it first")
     if len(motion) != len(goal):
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be met by a motion of {len(motion)}; crop one")
-    if not goal.asked.any():
+    if not goal.mask.any():
         return motion
     places = motion.positions()
-    if np.abs(np.where(goal.asked, goal.positions - places, 0.0)).max() < _DONE:
+    if np.abs(np.where(goal.mask, goal.positions - places, 0.0)).max() < _DONE:
         return motion
     shift = _root_shift(places, goal)
     goal = replace(goal, positions=_in_reach(places + shift[:, None], goal))
@@ -103,14 +103,14 @@ class _Targets:
 
 
 def _targets(goal: Goal, part: slice) -> _Targets:
-    joints = np.flatnonzero(goal.asked[part].any(axis=(0, 2)))
-    asked = goal.asked[part][:, joints]
+    joints = np.flatnonzero(goal.mask[part].any(axis=(0, 2)))
+    asked = goal.mask[part][:, joints]
     return _Targets(tuple(joints.tolist()), np.where(asked, goal.positions[part][:, joints], 0.0), asked / EXACT)
 
 
 def _windows(goal: Goal) -> Iterator[tuple[int, int]]:
     """Stretches of frames around targets."""
-    asked = goal.asked.any(axis=(1, 2)).astype(float)
+    asked = goal.mask.any(axis=(1, 2)).astype(float)
     yield from true_spans(np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
 
 
@@ -118,12 +118,12 @@ def _in_reach(places: Array, goal: Goal) -> Array:
     """(frames, 22, 3) the targets, those out of reach brought as near to the body as it can follow them."""
     result = goal.positions.copy()
     for joint, base, length in _chains():
-        base_asked = goal.asked[:, base].any(axis=-1, keepdims=True)
-        centre = np.where(goal.asked[:, base], goal.positions[:, base], places[:, base])
-        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - centre, 0.0)
+        base_asked = goal.mask[:, base].any(axis=-1, keepdims=True)
+        centre = np.where(goal.mask[:, base], goal.positions[:, base], places[:, base])
+        line = np.where(goal.mask[:, joint], goal.positions[:, joint] - centre, 0.0)
         longest = _STRETCH * length + np.where(base_asked, 0.0, _LEAN)
         share = np.minimum(1.0, longest / np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9))
-        far = (share < 1) & goal.asked[:, joint]
+        far = (share < 1) & goal.mask[:, joint]
         result[:, joint] = np.where(far, centre + line * share, result[:, joint])
     return result
 
@@ -142,13 +142,13 @@ def _root_shift(places: Array, goal: Goal) -> Array:
     """(frames, 3) metres, horizontal, smooth: what the whole body goes to be where its path, or a far target, is."""
     need, weight = np.zeros((len(places), 3)), np.zeros((len(places), 3))
     for joint, base, length in _chains():
-        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
+        line = np.where(goal.mask[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         distance = np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9)
         beyond = line * (1 - _EASY * length / distance).clip(0) * [1, 0, 1]
         beyond *= np.minimum(1, _WALK / np.linalg.norm(beyond, axis=-1, keepdims=True).clip(1e-9))
         far = np.linalg.norm(beyond, axis=-1, keepdims=True) > np.linalg.norm(need, axis=-1, keepdims=True)
         need, weight = np.where(far, beyond, need), np.where(far, 1 / 0.02, weight)
-    own = goal.asked[:, 0] * np.array([True, False, True])
+    own = goal.mask[:, 0] * np.array([True, False, True])
     need = np.where(own, goal.positions[:, 0] - places[:, 0], np.where(own.any(-1, keepdims=True), 0.0, need))
     weight = np.where(own, 1 / EXACT, np.where(own.any(-1, keepdims=True), 0.0, weight)) * _LARGE
     if not need.any():
@@ -176,7 +176,7 @@ def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Targets:
         wanted[:, side] += carried(shift, planted[:, side].max(axis=1))[:, None]
     near = np.ones(13)
     for joint, columns in _FEET_OF.items():
-        asked = np.convolve(goal.asked[:, joint].any(axis=-1), near)[6:-6] > 0.5
+        asked = np.convolve(goal.mask[:, joint].any(axis=-1), near)[6:-6] > 0.5
         for column in columns:
             weights[:, column] = np.where(asked, 1e-3 / SWINGING, weights[:, column])
     return _Targets(FEET, wanted, np.repeat(weights[..., None], 3, axis=-1))

@@ -123,8 +123,8 @@ class Meeting:
             _ask(goals[0], at, touch.joint, point - GAP / 2 * across)
             _ask(goals[1], at, touch.other, point + GAP / 2 * across)
         for goal, stand in zip(goals, stands or (), strict=False):
-            goal.positions[at, 0], goal.asked[at, 0] = (stand.x, 0.0, stand.z), (True, False, True)
-            goal.facing[at], goal.facing_asked[at] = stand.facing, True
+            goal.positions[at, 0], goal.mask[at, 0] = (stand.x, 0.0, stand.z), (True, False, True)
+            goal.facing[at], goal.facing_mask[at] = stand.facing, True
         return goals
 
     def _span(self, frames: int) -> tuple[int, int]:
@@ -185,7 +185,7 @@ class Meeting:
 
 
 def _ask(goal: Goal, at: NDArray[np.intp], joint: int, places: Array) -> None:
-    goal.positions[at, joint], goal.asked[at, joint] = places, True
+    goal.positions[at, joint], goal.mask[at, joint] = places, True
 
 
 # What is left when all is sampled
@@ -229,7 +229,7 @@ def _stepped(own: Array, shift: Array) -> Goal:
     goal = Goal.nothing(len(own))
     at = np.flatnonzero(np.linalg.norm(shift, axis=-1) > DEEP)
     goal.positions[at, 0, 0], goal.positions[at, 0, 2] = (own[at, 0][:, [0, 2]] + shift[at]).T
-    goal.asked[at, 0] = True, False, True
+    goal.mask[at, 0] = True, False, True
     return goal
 
 

@@ -56,11 +56,11 @@ def lowered(goal: Goal, places: Array, room: Array) -> Goal:
         room: (frames,) metres, as of `room_above`.
     """
     above = np.zeros(goal.positions.shape[:2])
-    for joint in (np.flatnonzero(goal.asked[:, 1:, 1].any(axis=0)) + 1).tolist():
+    for joint in (np.flatnonzero(goal.mask[:, 1:, 1].any(axis=0)) + 1).tolist():
         base, reach = REACH.get(joint, (joint, costs.TRUNK_SLACK))
-        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
+        line = np.where(goal.mask[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         above[:, joint] = (line[:, 1] - _straight(line, reach) - room - _SHRUG).clip(0)
-    above[goal.asked[:, 0, 1]] = 0.0
+    above[goal.mask[:, 0, 1]] = 0.0
     return replace(goal, positions=goal.positions - above[..., None] * [0, 1, 0]) if above.any() else goal
 
 
@@ -73,7 +73,7 @@ def out_of_reach(places: Array, goal: Goal) -> Array:
     """
     need = np.zeros(len(places))
     for joint, (base, reach) in REACH.items():
-        asked = goal.asked[:, joint].all(axis=-1, keepdims=True)
+        asked = goal.mask[:, joint].all(axis=-1, keepdims=True)
         line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
         beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - _straight(line, reach)).clip(0)
         need = np.where(np.abs(beyond) > np.abs(need), beyond, need)

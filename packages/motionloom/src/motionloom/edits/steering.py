@@ -138,14 +138,14 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     body = 0.8 * _bell(frames, width) + 0.2 * _bell(frames, 2.5)
     total = np.pad(_bell(frames, width).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     pace = total - total[first] - total[:, first : first + 1] + total[first, first]  # summed from ``first`` on and back
-    moving = np.flatnonzero(goal.asked[..., [0, 2]].any(axis=(1, 2)))
-    noise = np.where(goal.asked[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
-    turning = np.flatnonzero(goal.facing_asked)
-    lifting = np.flatnonzero(goal.asked[:, list(REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
+    moving = np.flatnonzero(goal.mask[..., [0, 2]].any(axis=(1, 2)))
+    noise = np.where(goal.mask[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
+    turning = np.flatnonzero(goal.facing_mask)
+    lifting = np.flatnonzero(goal.mask[:, list(REACH)].all(axis=-1).any(axis=-1) & ~goal.mask[:, 0, 1])
     still = _STILL**2 * pace
-    x, y = (_limb_plan(goal.asked[..., c], _TOGETHER[c], body, still if c == 0 else None) for c in (0, 1))
-    same = np.array_equal(goal.asked[..., 0], goal.asked[..., 2])
-    z = x if same else _limb_plan(goal.asked[..., 2], _TOGETHER[2], body, still)
+    x, y = (_limb_plan(goal.mask[..., c], _TOGETHER[c], body, still if c == 0 else None) for c in (0, 1))
+    same = np.array_equal(goal.mask[..., 0], goal.mask[..., 2])
+    z = x if same else _limb_plan(goal.mask[..., 2], _TOGETHER[2], body, still)
     return _Plan(
         goal,
         first,
@@ -247,12 +247,12 @@ class _Estimate:
 def _bent(features: Array, plan: _Plan, known: int) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     denoised = _decoded(features, plan.first)
-    error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
+    error = np.where(plan.goal.mask, plan.goal.positions - denoised.world(), 0.0)
     path = denoised.path + product(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
     facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
     denoised = replace(denoised, path=path, facing=facing)
     goal = plan.goal
-    if goal.asked[:, 1:, 1].any():
+    if goal.mask[:, 1:, 1].any():
         places = denoised.world()
         room, local = room_above(places), denoised.local.copy()
         need = np.minimum(out_of_reach(places, goal), room)[plan.lifting]
@@ -261,7 +261,7 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     if len(plan.turning):
         off = turn_between(goal.facing[plan.turning], heading(denoised.world())[plan.turning])
         denoised = replace(denoised, facing=facing + product(plan.turn, np.unwrap(off)))
-    error = np.where(goal.asked, goal.positions - denoised.world(), 0.0)
+    error = np.where(goal.mask, goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
     error[:, 1:] *= np.minimum(1.0, _LONGEST / far.clip(1e-9))
     path, change = denoised.path.copy(), np.zeros_like(denoised.local)
@@ -296,7 +296,7 @@ def _standing(places: Array, contacts: Array, goal: Goal, known: int) -> Array:
     """
     change = np.zeros_like(places)
     for side, (knee, ankle, toe) in enumerate(costs.LEGS):
-        asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
+        asked = goal.mask[:, [knee, ankle, toe]].any(axis=(1, 2))
         free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
         planted = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
         still = stilled(places[:, ankle], places[:, toe], planted, known=known)
@@ -339,16 +339,16 @@ def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     far = np.linalg.norm(error, axis=-1, keepdims=True)
     beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]
     for joint, (base, reach) in REACH.items():
-        if not goal.asked[:, joint].any():
+        if not goal.mask[:, joint].any():
             continue
-        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
+        line = np.where(goal.mask[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         room = np.sqrt((reach**2 - line[:, 1] ** 2).clip((0.2 * reach) ** 2))
         flat = line[:, [0, 2]]
         flat = flat * (1 - room / np.linalg.norm(flat, axis=-1).clip(1e-9)).clip(0)[:, None]
         more = np.linalg.norm(flat, axis=-1) > np.linalg.norm(beyond[:, joint], axis=-1)
         beyond[:, joint] = np.where(more[:, None], flat, beyond[:, joint])
-    mean = beyond.sum(axis=1) / goal.asked.any(axis=-1).sum(axis=1).clip(1)[:, None]
-    own = goal.asked[:, 0][:, [0, 2]]
+    mean = beyond.sum(axis=1) / goal.mask.any(axis=-1).sum(axis=1).clip(1)[:, None]
+    own = goal.mask[:, 0][:, [0, 2]]
     return np.where(own.any(axis=-1, keepdims=True), np.where(own, error[:, 0][:, [0, 2]], 0.0), mean)
 
 

@@ -1,4 +1,4 @@
-"""What was taught from clips, as it is asked for: files of adapters, each with a factor."""
+"""Adapters trained on clips, as a request names them: files, each with a factor."""
 
 from pathlib import Path
 from typing import Any, TypeAlias

@@ -18,7 +18,7 @@ RAMP = 0.4
 TURNING = 75.0
 """Degrees per second of somebody who turns on the spot."""
 SLOWEST = 0.5
-"""Share of the pace of the words that a way may be slowed to where more time is asked; beyond it one stands."""
+"""Share of the pace of the words that a way may be slowed to for a longer time; beyond it the person stands still."""
 TURN_OFF, WAY_OFF = 10.0, 0.1
 """Degrees (10 of a full turn), and share of a way, by which a motion may miss what was read."""
 
@@ -50,15 +50,15 @@ def seconds_for(amount: Amount) -> float:
 def goal_for(amount: Amount, seconds: float) -> Goal:
     """The goal for one action of ``seconds``: a turn on the spot, or a way of the pelvis and where it is faced.
 
-    What is longer than needed is slowed down to `SLOWEST`, and stood for the rest; what is shorter goes faster. Raises
-    `MotionloomError` where nobody runs as fast.
+    A longer time slows the person down to `SLOWEST`, who stands still for the rest; a shorter time is a faster way.
+    Raises `MotionloomError` where nobody runs as fast.
     """
     check_speed(np.array([[0.0, 0.0], [0.0, amount.metres]]), np.array([0.0, seconds]))
     frames = round(seconds * FPS)
     goal = Goal.nothing(frames)
     share = _shares(frames, seconds, seconds_for(amount))
     side = 1.0 if amount.direction == "left" else -1.0
-    goal.facing_asked[:] = True
+    goal.facing_mask[:] = True
     if amount.kind == "turn":
         goal.facing[:] = side * np.radians(amount.size) * share
         return goal
@@ -71,7 +71,7 @@ def goal_for(amount: Amount, seconds: float) -> Goal:
         toward = {"forward": (0.0, 1.0), "backward": (0.0, -1.0), "left": (1.0, 0.0), "right": (-1.0, 0.0)}
         x, z = (amount.metres * share * part for part in toward[amount.direction])
     goal.positions[:, 0, 0], goal.positions[:, 0, 2] = x, z
-    goal.asked[:, 0, [0, 2]] = True
+    goal.mask[:, 0, [0, 2]] = True
     return goal
 
 
@@ -89,7 +89,7 @@ def _shares(frames: int, seconds: float, natural: float) -> np.ndarray:
 
 
 def measured(amount: Amount, positions: np.ndarray, fps: float = FPS) -> float:
-    """Degrees turned to the side that was said, metres gone, steps, or repetitions.
+    """Degrees turned to the amount's side, metres travelled, steps, or repetitions.
 
     positions: (frames, 22, 3) metres in the world. Of an arc the turn is measured; of steps to a side those of the foot
     on that side, which the other follows.
@@ -109,8 +109,8 @@ def measured(amount: Amount, positions: np.ndarray, fps: float = FPS) -> float:
     return amount.metre * float(np.hypot(moved[0], moved[2]))
 
 
-def kept(amount: Amount, size: float) -> bool:
-    """Whether what was `measured` is what was asked."""
+def is_met(amount: Amount, size: float) -> bool:
+    """Whether the `measured` size is the amount's own, within the tolerance."""
     if amount.kind in ("turn", "arc"):
         return abs(size - amount.size) <= max(TURN_OFF, amount.size / 36)
     return size == amount.size if amount.kind != "way" else abs(size / amount.size - 1) <= WAY_OFF

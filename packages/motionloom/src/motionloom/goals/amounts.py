@@ -45,7 +45,7 @@ class Amount:
 
     @property
     def unit(self) -> str:
-        """Of what is asked and measured: degrees, m, steps, or what is repeated."""
+        """Unit of the requested and of the measured size: degrees, m, steps, or what is repeated."""
         if self.kind == "count":
             return str(self.of)
         return {"way": "m", "steps": "steps"}.get(self.kind, "degrees")
@@ -102,7 +102,7 @@ _SECONDS = re.compile(
     rf"(?<![\w.]){NUMBER}[ -]?(s|secs?|seconds?|mins?|minutes?)\b(?! (?:ago|later|before|after|lap|hand|time))"
 )
 _OFTEN = re.compile(rf"\b(once|twice|thrice|{NUMBER} times?)\b")
-_OFTEN_KEPT = re.compile(
+_OFTEN_OF_LIMBS = re.compile(
     r"\b(?:at|more than|once (?:upon|again|more)|all at|for) (?:once|1 time)\b|\bonce (?:upon|again|more)\b"
 )
 _COUNTED: tuple[tuple[str, Counted], ...] = (
@@ -172,96 +172,96 @@ def read_amount(text: str) -> Amount | None:
 
     text: one action (`motionloom.goals.sequence.split_actions`).
     """
-    said = in_digits(text)
-    verbs = [base for word in re.findall(r"[a-z]+", said) if word != "left" and (base := base_of(word))]
-    if _AGES.search(said):
-        said = _AGES.sub(" ", said)
-    if found := _times(said):
-        return found
-    if not verbs or {kind_of_verb(verb, said) for verb in verbs} & {"jump", "fight", "dance"}:
+    phrase = in_digits(text)
+    verbs = [base for word in re.findall(r"[a-z]+", phrase) if word != "left" and (base := base_of(word))]
+    if _AGES.search(phrase):
+        phrase = _AGES.sub(" ", phrase)
+    if repetitions := _repetitions(phrase):
+        return repetitions
+    if not verbs or {kind_of_verb(verb, phrase) for verb in verbs} & {"jump", "fight", "dance"}:
         return None
-    return _turn(said, verbs) or _arc(said, verbs) or _steps(said, verbs) or _way(said, verbs)
+    return _turn(phrase, verbs) or _arc(phrase, verbs) or _steps(phrase, verbs) or _distance(phrase, verbs)
 
 
 def read_seconds(text: str) -> float | None:
     """The seconds that "for ten seconds", "for half a minute" ask for; None without, and beyond a minute."""
-    found = list(_SECONDS.finditer(in_digits(text)))
-    if len(found) != 1:
+    matches = list(_SECONDS.finditer(in_digits(text)))
+    if len(matches) != 1:
         return None
-    seconds = float(found[0][1]) * (60.0 if found[0][2].startswith("min") else 1.0)
+    seconds = float(matches[0][1]) * (60.0 if matches[0][2].startswith("min") else 1.0)
     return seconds if 0.2 <= seconds <= MOST_SECONDS else None
 
 
-def once(text: str) -> str:
+def single_stroke(text: str) -> str:
     """The words of one stroke of what is counted: "a person jumps" of "a person jumps three times"."""
-    said = in_digits(text, lower=False)
-    less = _OFTEN.sub("", said)
-    if less == said:
-        less = re.sub(rf"\b{NUMBER} (?=(?:[a-z]+ )?[a-z]+)", "", said, count=1)
+    phrase = in_digits(text, lower=False)
+    less = _OFTEN.sub("", phrase)
+    if less == phrase:
+        less = re.sub(rf"\b{NUMBER} (?=(?:[a-z]+ )?[a-z]+)", "", phrase, count=1)
     return " ".join(less.split()).strip(" ,")
 
 
-def counted_in(said: str) -> set[Counted]:
-    """What can be counted of what is said, in small letters."""
-    kinds: set[Counted] = {what for words, what in _COUNTED if re.search(rf"\b(?:{words})\b", said)}
+def countable_actions(phrase: str) -> set[Counted]:
+    """Kinds of countable actions in a phrase of lower-case letters."""
+    kinds: set[Counted] = {what for words, what in _COUNTED if re.search(rf"\b(?:{words})\b", phrase)}
     return kinds - {"jumps"} if "jumping jacks" in kinds else kinds
 
 
-def _times(said: str) -> Amount | None:
+def _repetitions(phrase: str) -> Amount | None:
     """Repetitions of one action whose strokes can be counted."""
-    often, many = _OFTEN.findall(_OFTEN_KEPT.sub(" ", said)), list(_MANY.finditer(said))
-    if len(often) + len(many) != 1 or re.search(r"\b(?:while|every|per)\b", said):
+    often, many = _OFTEN.findall(_OFTEN_OF_LIMBS.sub(" ", phrase)), list(_MANY.finditer(phrase))
+    if len(often) + len(many) != 1 or re.search(r"\b(?:while|every|per)\b", phrase):
         return None
-    kinds = counted_in(said)
+    kinds = countable_actions(phrase)
     if len(kinds) != 1:
         return None
-    size = float(many[0][1]) if many else _often(*often[0])
+    size = float(many[0][1]) if many else _repeat_count(*often[0])
     if size != int(size) or not 1 <= size <= MOST_TIMES:
         return None
-    side = _side(said)
+    side = _side(phrase)
     return Amount(
         "count", size, "left" if side == "left" else "right" if side == "right" else "forward", of=kinds.pop()
     )
 
 
-def _often(word: str, number: str) -> float:
+def _repeat_count(word: str, number: str) -> float:
     return {"once": 1.0, "twice": 2.0, "thrice": 3.0}.get(word) or float(number)
 
 
-def _turn(said: str, verbs: list[str]) -> Amount | None:
-    if not _TURNS & set(verbs) or _BODY.search(said) or set(verbs) & {"throw", "look"}:
+def _turn(phrase: str, verbs: list[str]) -> Amount | None:
+    if not _TURNS & set(verbs) or _BODY.search(phrase) or set(verbs) & {"throw", "look"}:
         return None
-    found, part = list(_DEGREES.finditer(said)), _PART_OF_TURN.search(said)
-    often = _TURNS_OFTEN.search(said) or _OFTEN.search(_OFTEN_KEPT.sub(" ", said))
-    if len(found) > 1 or bool(found) + bool(part) + bool(often) != 1:
+    matches, part = list(_DEGREES.finditer(phrase)), _PART_OF_TURN.search(phrase)
+    often = _TURNS_OFTEN.search(phrase) or _OFTEN.search(_OFTEN_OF_LIMBS.sub(" ", phrase))
+    if len(matches) > 1 or bool(matches) + bool(part) + bool(often) != 1:
         return None
     if often:
-        degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _often(often[1], often[2]))
+        degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _repeat_count(often[1], often[2]))
     else:
         parts = {"half": 180.0, "0.5": 180.0, "quarter": 90.0, "full": 360.0}
-        degrees = float(found[0][1]) if found else parts.get(part[1], 270.0)  # type: ignore[index]
-    side = _side(said) or ("left" if degrees % 180 == 0 and not re.search(r"\b(?:left|right)\b", said) else "")
+        degrees = float(matches[0][1]) if matches else parts.get(part[1], 270.0)  # type: ignore[index]
+    side = _side(phrase) or ("left" if degrees % 180 == 0 and not re.search(r"\b(?:left|right)\b", phrase) else "")
     if not side or not 5 <= degrees <= MOST_DEGREES or set(verbs) & (_GOING - {"step", "back"}):
         return None
     return Amount("turn", degrees, "left" if side == "left" else "right")
 
 
-def _arc(said: str, verbs: list[str]) -> Amount | None:
-    found, side = _ARC.search(said) or _CIRCLE.search(said), _side(said)
-    if not found or not side or not set(verbs) & _GOING or _BODY.search(said):
+def _arc(phrase: str, verbs: list[str]) -> Amount | None:
+    match, side = _ARC.search(phrase) or _CIRCLE.search(phrase), _side(phrase)
+    if not match or not side or not set(verbs) & _GOING or _BODY.search(phrase):
         return None
-    backward = _backward(said)
-    size = found[1] if found.re is _ARC else "full"
+    backward = _is_backward(phrase)
+    size = match[1] if match.re is _ARC else "full"
     degrees = 90.0 if size == "quarter" else 180.0 if size in ("half", "semi", "0.5") else 360.0
-    return Amount("arc", degrees, "left" if side == "left" else "right", speed=_pace(said, verbs), backward=backward)
+    return Amount("arc", degrees, "left" if side == "left" else "right", speed=_pace(phrase, verbs), backward=backward)
 
 
-def _steps(said: str, verbs: list[str]) -> Amount | None:
-    found = list(_STEPS.finditer(said))
-    if len(found) != 1 or not set(verbs) & _STEPPING or _ELSE.search(said):
+def _steps(phrase: str, verbs: list[str]) -> Amount | None:
+    matches = list(_STEPS.finditer(phrase))
+    if len(matches) != 1 or not set(verbs) & _STEPPING or _ELSE.search(phrase):
         return None
-    size, direction = found[0][2] or "", _direction(said, aside=True)
-    count = float(found[0][1]) if found[0][1] else 1.0
+    size, direction = matches[0][2] or "", _direction(phrase, aside=True)
+    count = float(matches[0][1]) if matches[0][1] else 1.0
     if direction is None or count != int(count) or not 1 <= count <= MOST_STEPS:
         return None
     stride = {"forward": 0.62, "backward": 0.4}.get(direction, 0.4)
@@ -269,60 +269,60 @@ def _steps(said: str, verbs: list[str]) -> Amount | None:
         stride *= 0.6
     elif size in ("big", "large", "long", "giant", "huge"):
         stride *= 1.3
-    seconds = 0.5 if direction != "forward" or _slow(said) else 0.4 if "run" in verbs else 0.45
+    seconds = 0.5 if direction != "forward" or _is_slow(phrase) else 0.4 if "run" in verbs else 0.45
     return Amount("steps", count, direction, stride=stride, speed=stride / seconds)
 
 
-def _way(said: str, verbs: list[str]) -> Amount | None:
-    found, direction = list(_WAY.finditer(said)), _direction(said, aside=bool({"move", "step"} & set(verbs)))
+def _distance(phrase: str, verbs: list[str]) -> Amount | None:
+    matches, direction = list(_WAY.finditer(phrase)), _direction(phrase, aside=bool({"move", "step"} & set(verbs)))
     going = [verb for verb in verbs if verb in _GOING]
-    if len(found) != 1 or direction is None or not going or _ELSE.search(said):
+    if len(matches) != 1 or direction is None or not going or _ELSE.search(phrase):
         return None
     if set(verbs) - set(going) - {"stop", "halt", "track", "return", "keep", "continue"} - {"open", "place"}:
         return None
-    unit = found[0][2]
-    metres = float(found[0][1]) * _UNITS[unit if unit in _UNITS else unit.removesuffix("s")]
+    unit = matches[0][2]
+    metres = float(matches[0][1]) * _UNITS[unit if unit in _UNITS else unit.removesuffix("s")]
     if not 0.2 <= metres <= MOST_METRES:
         return None
-    return Amount("way", round(metres, 3), direction, speed=_pace(said, verbs))
+    return Amount("way", round(metres, 3), direction, speed=_pace(phrase, verbs))
 
 
-def _pace(said: str, verbs: list[str]) -> float:
+def _pace(phrase: str, verbs: list[str]) -> float:
     pace = next((_PACES[verb] for verb in verbs if verb in _PACES), _WALKING)
-    if _backward(said):
+    if _is_backward(phrase):
         pace *= 0.65
-    elif _direction(said, aside=False) in ("left", "right"):
+    elif _direction(phrase, aside=False) in ("left", "right"):
         pace = min(pace, 0.7)
-    if _slow(said):
+    if _is_slow(phrase):
         return 0.65 * pace
-    return 1.35 * pace if re.search(r"\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b", said) else pace
+    return 1.35 * pace if re.search(r"\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b", phrase) else pace
 
 
-def _slow(said: str) -> bool:
-    return bool(re.search(r"\b(?:slowly|slow|carefully|careful|cautiously|gently)\b", said))
+def _is_slow(phrase: str) -> bool:
+    return bool(re.search(r"\b(?:slowly|slow|carefully|careful|cautiously|gently)\b", phrase))
 
 
-def _backward(said: str) -> bool:
-    return bool(re.search(r"\b(?:backwards?|back|in reverse|rearwards?)\b", said))
+def _is_backward(phrase: str) -> bool:
+    return bool(re.search(r"\b(?:backwards?|back|in reverse|rearwards?)\b", phrase))
 
 
-def _side(said: str) -> str:
-    """The one side that is said, seen from above for clockwise; empty for none and for both."""
-    if re.search(r"\b(?:counter|anti)[ -]?clockwise\b", said):
+def _side(phrase: str) -> str:
+    """The one side that a phrase names, seen from above for clockwise; empty for none and for both."""
+    if re.search(r"\b(?:counter|anti)[ -]?clockwise\b", phrase):
         return "left"
-    if re.search(r"\bclockwise\b", said):
+    if re.search(r"\bclockwise\b", phrase):
         return "right"
-    sides = set(re.findall(r"\b(left|right)(?!(?:[ -]handed| after| before| away| in front))(?:wards?)?\b", said))
+    sides = set(re.findall(r"\b(left|right)(?!(?:[ -]handed| after| before| away| in front))(?:wards?)?\b", phrase))
     return sides.pop() if len(sides) == 1 else ""
 
 
-def _direction(said: str, *, aside: bool) -> Direction | None:
+def _direction(phrase: str, *, aside: bool) -> Direction | None:
     """Where a way leads; None where that is not clear. ``aside``: a side alone is enough for a step to it."""
-    back, side = _backward(said), _side(said)
-    named = bool(re.search(r"\b(?:left|right)\b", said))
-    sideways = bool(re.search(r"\b(?:sideways?|side[ -]?steps?|sidestepping|side steps?|laterally)\b", said))
+    back, side = _is_backward(phrase), _side(phrase)
+    named = bool(re.search(r"\b(?:left|right)\b", phrase))
+    sideways = bool(re.search(r"\b(?:sideways?|side[ -]?steps?|sidestepping|side steps?|laterally)\b", phrase))
     if sideways or (aside and named):
         return None if not side or back else "left" if side == "left" else "right"
-    if named or (back and re.search(r"\bforwards?\b", said)):
+    if named or (back and re.search(r"\bforwards?\b", phrase)):
         return None
     return "backward" if back else "forward"

@@ -119,15 +119,15 @@ _BESIDE = re.compile(r"\b(?:side by side|beside|walk|walks|walking|stroll|stroll
 
 
 def read_contact(prompts: Sequence[str]) -> Contact | None:
-    """How two people touch, by what each of them is asked to do (two texts, which may be one); None where nothing is
+    """How two people touch, by the prompt of each (two texts, which may be one); None where nothing is
     said of it."""
     for person, prompt in enumerate(prompts):
-        said = " ".join(prompt.lower().replace(",", " ").split())
+        words = " ".join(prompt.lower().replace(",", " ").split())
         for pattern, contact in _CONTACTS:
-            found = re.search(rf"\b(?:{pattern})\b", said)
-            if found is None or _NOT.search(said[: found.start()]):
+            match = re.search(rf"\b(?:{pattern})\b", words)
+            if match is None or _NOT.search(words[: match.start()]):
                 continue
-            if contact.turn == "any" and _BESIDE.search(said):
+            if contact.turn == "any" and _BESIDE.search(words):
                 contact = replace(contact, turn="beside")
             return _exchanged(contact) if person else contact
     return None

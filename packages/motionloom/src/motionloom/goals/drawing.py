@@ -20,7 +20,7 @@ from motionloom.io import text
 Array = NDArray[np.float64]
 
 SHAPES = ("path", "polyline", "polygon", "line", "circle", "ellipse")
-_NOT_DRAWN = {"defs", "clipPath", "mask", "marker", "pattern", "symbol"}
+_NOT_RENDERED = {"defs", "clipPath", "mask", "marker", "pattern", "symbol"}
 _MAX_BYTES = 16_000_000
 _DEEPEST = 500
 MAX_PIECES = 20_000
@@ -46,10 +46,10 @@ def read_drawing(path: Path | str) -> Array:
     """
     name, attributes, matrix = _first_shape(text.read_bytes(path, max_bytes=_MAX_BYTES), path)
     try:
-        drawn = np.array([(point.real, point.imag) for point in _POINTS[name](attributes)])
+        strokes = np.array([(point.real, point.imag) for point in _POINTS[name](attributes)])
     except _BadShape as error:
         raise MotionloomError(f"{path}: the <{name}> cannot be walked: {error}") from None
-    points = drawn @ matrix[:, :2].T + matrix[:, 2]
+    points = strokes @ matrix[:, :2].T + matrix[:, 2]
     points = -(points - points[:1]) + 0.0
     if not (np.isfinite(points).all() and np.abs(points).max() <= text.LIMIT and np.abs(points).max() > 0):
         raise MotionloomError(f"{path}: the <{name}> has no length, or is larger than any drawing")
@@ -75,7 +75,7 @@ def _first_shape(data: bytes, path: Path | str) -> tuple[str, dict[str, str], Ar
             raise MotionloomError(f"{path} is not an SVG drawing: its outermost element is {text.shown(name)}")
         if len(around) == _DEEPEST:
             raise MotionloomError(f"{path} has elements more than {_DEEPEST} deep, which are not read")
-        hidden = name in _NOT_DRAWN or bool(around and around[-1][0])
+        hidden = name in _NOT_RENDERED or bool(around and around[-1][0])
         around.append((hidden, attributes.get("transform", "")))
         if name in SHAPES and not hidden and not found:
             found.append((name, attributes, [said for _, said in around]))
@@ -111,13 +111,13 @@ def _chained(outer: Array, inner: Array) -> Array:
     return np.column_stack([outer[:, :2] @ inner[:, :2], outer[:, :2] @ inner[:, 2] + outer[:, 2]])
 
 
-def _transform(said: str) -> Iterator[tuple[str, list[float]]]:
+def _transform(source: str) -> Iterator[tuple[str, list[float]]]:
     """The steps of a ``transform`` attribute: what each does, and its numbers."""
-    said, at = said.strip(), 0
-    while at < len(said):
-        match = _TRANSFORM.match(said, at)
+    source, at = source.strip(), 0
+    while at < len(source):
+        match = _TRANSFORM.match(source, at)
         if match is None:
-            raise _BadShape(f"a transform that cannot be read: {text.shown(said[at : at + 100])}")
+            raise _BadShape(f"a transform that cannot be read: {text.shown(source[at : at + 100])}")
         yield match[1], _list(match[2], most=6)
         at = match.end()
 
@@ -139,29 +139,29 @@ def _one_transform(kind: str, v: list[float]) -> Array:
     return np.array([[c, -s, x - c * x + s * y], [s, c, y - s * x - c * y]])
 
 
-def _list(said: str, *, most: int) -> list[float]:
+def _list(source: str, *, most: int) -> list[float]:
     """Numbers parted by blanks or commas; one more than ``most`` where there are more."""
-    values, at = [], _BLANK.match(said).end()  # type: ignore[union-attr]
-    while at < len(said) and len(values) <= most:
-        value, at = _number(said, at)
+    values, at = [], _BLANK.match(source).end()  # type: ignore[union-attr]
+    while at < len(source) and len(values) <= most:
+        value, at = _number(source, at)
         values.append(value)
-        at = _BLANK.match(said, at).end()  # type: ignore[union-attr]
+        at = _BLANK.match(source, at).end()  # type: ignore[union-attr]
     return values
 
 
-def _number(said: str, at: int) -> tuple[float, int]:
-    match = _NUMBER.match(said, at)
+def _number(source: str, at: int) -> tuple[float, int]:
+    match = _NUMBER.match(source, at)
     value = None if match is None else text.number(match[0])
     if match is None or value is None:
-        raise _BadShape(f"{text.shown(said[at : at + 20])} is where a number below 1e9 is expected")
+        raise _BadShape(f"{text.shown(source[at : at + 20])} is where a number below 1e9 is expected")
     return value, match.end()
 
 
 def _attribute(attributes: dict[str, str], name: str) -> float:
-    said = attributes.get(name, "0").strip()
-    value, end = _number(said, 0)
-    if said[end:] not in ("", "px"):
-        raise _BadShape(f"its {name} is {text.shown(said)}; give a number in the drawing's own unit")
+    source = attributes.get(name, "0").strip()
+    value, end = _number(source, 0)
+    if source[end:] not in ("", "px"):
+        raise _BadShape(f"its {name} is {text.shown(source)}; give a number in the drawing's own unit")
     return value
 
 
@@ -203,27 +203,27 @@ def _path(attributes: dict[str, str]) -> list[complex]:
     return pen.points
 
 
-def _commands(said: str):
+def _commands(source: str):
     """(letter, numbers) of path data, repeated letters written out."""
-    at, letter, count = _BLANK.match(said).end(), "", 0  # type: ignore[union-attr]
-    while at < len(said):
-        if said[at].upper() in _TAKES:
-            letter, at = said[at], at + 1
+    at, letter, count = _BLANK.match(source).end(), "", 0  # type: ignore[union-attr]
+    while at < len(source):
+        if source[at].upper() in _TAKES:
+            letter, at = source[at], at + 1
         elif letter.upper() in ("", "Z"):
-            raise _BadShape(f"{text.shown(said[at : at + 20])} is where a command such as M or L is expected")
+            raise _BadShape(f"{text.shown(source[at : at + 20])} is where a command such as M or L is expected")
         elif letter in "Mm":
             letter = "L" if letter == "M" else "l"
         values = []
         for place in range(_TAKES[letter.upper()]):
-            at = _BLANK.match(said, at).end()  # type: ignore[union-attr]
+            at = _BLANK.match(source, at).end()  # type: ignore[union-attr]
             if letter in "Aa" and place in (3, 4):  # a flag is one digit and may touch the next number
-                if said[at : at + 1] not in ("0", "1"):
-                    raise _BadShape(f"{text.shown(said[at : at + 20])} is where an arc's flag, 0 or 1, is expected")
-                value, at = float(said[at]), at + 1
+                if source[at : at + 1] not in ("0", "1"):
+                    raise _BadShape(f"{text.shown(source[at : at + 20])} is where an arc's flag, 0 or 1, is expected")
+                value, at = float(source[at]), at + 1
             else:
-                value, at = _number(said, at)
+                value, at = _number(source, at)
             values.append(value)
-        at = _BLANK.match(said, at).end()  # type: ignore[union-attr]
+        at = _BLANK.match(source, at).end()  # type: ignore[union-attr]
         count += 1
         if count > MAX_PIECES:
             raise _BadShape(f"it has more than {MAX_PIECES} pieces")

@@ -1,7 +1,7 @@
 """What the words of one action allow to check: where to, which way round, what is done, how low.
 
 Not a judge of motion (`motionloom_lab` has one): the few things that words say plainly and joints show plainly, by
-which one of several drawings is chosen (`motionloom.tasks.best`).
+which one of several candidates is chosen (`motionloom.tasks.best`).
 """
 
 import re
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from motionloom.goals.amounts import counted_in
+from motionloom.goals.amounts import countable_actions
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.counts import Counted, Side, count
 from motionloom.kinematics.gestures import hands_height, pelvis_height, wrist_swings
@@ -37,55 +37,55 @@ def asks_for_rest(text: str) -> bool:
 
 def checks_of(text: str) -> list[Check]:
     """What can be checked of the words of one action."""
-    said = text.lower()
-    kinds, side = _kinds(said), re.findall(r"\b(left|right)\b", said)
+    phrase = text.lower()
+    kinds, side = _kinds(phrase), re.findall(r"\b(left|right)\b", phrase)
     one: Side = "" if len(set(side)) != 1 else "left" if side[0] == "left" else "right"
-    limb = bool(re.search(r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b", said))
-    checks = [_often(what, one if limb else "") for what in counted_in(said)]
-    if "turn" in kinds or re.search(r"\bturn", said):
-        checks += [_turned(one)] if one and not limb else []
-        checks += [_turned_round] if re.search(r"\b(?:around|round|about|180)\b", said) else []
-    elif "locomotion" in kinds and not re.search(r"\b(?:in place|on (?:the|one) spot|treadmill)\b", said):
-        checks += _way(said, one)
-    if re.search(r"\b(?:crouch|kneel|squat|sit down|sits down|sitting down|duck)", said):
+    limb = bool(re.search(r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b", phrase))
+    checks = [_repetition_check(what, one if limb else "") for what in countable_actions(phrase)]
+    if "turn" in kinds or re.search(r"\bturn", phrase):
+        checks += [_turn_check(one)] if one and not limb else []
+        checks += [_turns_round] if re.search(r"\b(?:around|round|about|180)\b", phrase) else []
+    elif "locomotion" in kinds and not re.search(r"\b(?:in place|on (?:the|one) spot|treadmill)\b", phrase):
+        checks += _travel_checks(phrase, one)
+    if re.search(r"\b(?:crouch|kneel|squat|sit down|sits down|sitting down|duck)", phrase):
         checks.append(lambda p, fps: float(pelvis_height(p).min()) < _LOW)
-    if re.search(r"\b(?:rais|lift)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b", said):
-        checks.append(_raised(one))
-    if re.search(r"\bwav(?:e|es|ing)\b", said):
-        checks.append(_waved(one if limb else ""))
+    if re.search(r"\b(?:rais|lift)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b", phrase):
+        checks.append(_raised_hand_check(one))
+    if re.search(r"\bwav(?:e|es|ing)\b", phrase):
+        checks.append(_wave_check(one if limb else ""))
     return checks
 
 
-def _kinds(said: str) -> set[str]:
-    words = [word for word in re.findall(r"[a-z]+", said) if word != "left"]
-    return {kind_of_verb(word, said) for word in words if base_of(word)}
+def _kinds(phrase: str) -> set[str]:
+    words = [word for word in re.findall(r"[a-z]+", phrase) if word != "left"]
+    return {kind_of_verb(word, phrase) for word in words if base_of(word)}
 
 
-def _often(what: Counted, side: Side) -> Check:
+def _repetition_check(what: Counted, side: Side) -> Check:
     return lambda p, fps: count(what, p, fps, side=side) > 0
 
 
-def _turned(side: Side) -> Check:
+def _turn_check(side: Side) -> Check:
     sign = 1 if side == "left" else -1
     return lambda p, fps: sign * turn(p) > _TURNS
 
 
-def _turned_round(p: np.ndarray, fps: float) -> bool:
+def _turns_round(p: np.ndarray, fps: float) -> bool:
     return abs(turn(p)) > _TURNS_ROUND
 
 
-def _way(said: str, side: Side) -> list[Check]:
-    if re.search(r"\b(?:backwards?|in reverse)\b", said):
+def _travel_checks(phrase: str, side: Side) -> list[Check]:
+    if re.search(r"\b(?:backwards?|in reverse)\b", phrase):
         return [lambda p, fps: displacement(p, fps).forward < -_GOES]
-    if side and re.search(r"\b(?:side|strafe)", said):
+    if side and re.search(r"\b(?:side|strafe)", phrase):
         sign = 1 if side == "left" else -1
         return [lambda p, fps: sign * displacement(p, fps).left > _GOES]
-    if re.search(r"\bforwards?\b", said):
+    if re.search(r"\bforwards?\b", phrase):
         return [lambda p, fps: displacement(p, fps).forward > _GOES]
     return [lambda p, fps: travel(p, fps) > _GOES]
 
 
-def _raised(side: Side) -> Check:
+def _raised_hand_check(side: Side) -> Check:
     def raised(p: np.ndarray, fps: float) -> bool:
         up = hands_height(p, over="neck").max(axis=0) > 0
         return bool(up[0 if side == "left" else 1] if side else up.any())
@@ -93,7 +93,7 @@ def _raised(side: Side) -> Check:
     return raised
 
 
-def _waved(side: Side) -> Check:
+def _wave_check(side: Side) -> Check:
     def waved(p: np.ndarray, fps: float) -> bool:
         swings = wrist_swings(p, fps)
         return (max(swings) if not side else swings[0 if side == "left" else 1]) >= 3

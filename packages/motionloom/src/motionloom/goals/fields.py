@@ -24,21 +24,21 @@ class Field:
 
     def fail(self, message: str) -> NoReturn:
         """Raise a `MotionloomError` that names the file, the line and the key."""
-        said = f"'{self.name}' {message}" if self.name else f"the goal {message}"
-        raise MotionloomError(f"{self.source}{self._line()}: {said}" if self.source else said)
+        problem = f"'{self.name}' {message}" if self.name else f"the goal {message}"
+        raise MotionloomError(f"{self.source}{self._line()}: {problem}" if self.source else problem)
 
     def _line(self) -> str:
-        """On which line of the file the value is, in words; nothing where that cannot be told."""
+        """On which line of the file the value is, in words; empty where it is unknown."""
         with suppress(MotionloomError):
-            found: Any = read_lined(self.source)
+            node: Any = read_lined(self.source)
             for key in re.findall(r"[^.\[\]]+", self.name):
-                found = found.value[int(key) if isinstance(found.value, list) else key]
-            return f", line {found.key_line or found.line}"
+                node = node.value[int(key) if isinstance(node.value, list) else key]
+            return f", line {node.key_line or node.line}"
         return ""
 
-    def wrong(self, wanted: str) -> NoReturn:
-        """Say what was wanted and what is there."""
-        self.fail(f"must be {wanted}; got {kind_of(self.value)}")
+    def wrong(self, expected: str) -> NoReturn:
+        """Raise a `MotionloomError` that says what is expected and what the value is."""
+        self.fail(f"must be {expected}; got {kind_of(self.value)}")
 
     def mapping(self, known: Collection[str], needed: Collection[str] = ()) -> dict[str, "Field"]:
         """The values by key; no key but ``known`` ones, and all that are ``needed`` (fields say it themselves)."""
@@ -108,28 +108,28 @@ class Field:
 
     def file(self, folder: Path) -> Path:
         """A file in ``folder`` or below it, named from there; a file from an untrusted source reads nothing else."""
-        said = self.value
-        if not isinstance(said, str) or not said.strip() or not said.isprintable():
+        name = self.value
+        if not isinstance(name, str) or not name.strip() or not name.isprintable():
             self.wrong("the name of a file")
-        foreign = PureWindowsPath(said)
+        foreign = PureWindowsPath(name)
         if foreign.drive or foreign.root or ".." in foreign.parts:
             self.fail(
-                f"is {quoted(said)}, which leads out of the folder {folder}; put the file there and name it without "
+                f"is {quoted(name)}, which leads out of the folder {folder}; put the file there and name it without "
                 "'..' and without a leading '/'"
             )
-        place = folder / said
+        place = folder / name
         try:
             inside, there = place.resolve().is_relative_to(folder.resolve()), place.is_file()
         except (OSError, ValueError, RuntimeError):
             inside, there = True, False
         if not inside:
-            self.fail(f"is {quoted(said)}, a link that leads out of the folder {folder}; copy the file there")
+            self.fail(f"is {quoted(name)}, a link that leads out of the folder {folder}; copy the file there")
         if not there:
-            self.fail(f"names {quoted(said, 200)}, and there is no such file in {folder}")
+            self.fail(f"names {quoted(name, 200)}, and there is no such file in {folder}")
         return place
 
 
-def value(given: Mapping[str, Field], keys: Mapping[str, Spec], name: str) -> Any:
-    """What is given for a key, as its field holds it; the field's default where nothing is."""
-    found = given.get(name)
-    return keys[name].default if found is None else found.read(keys[name])
+def value(entries: Mapping[str, Field], keys: Mapping[str, Spec], name: str) -> Any:
+    """The value of a key, as its field holds it; the field's default where the key is missing."""
+    entry = entries.get(name)
+    return keys[name].default if entry is None else entry.read(keys[name])

@@ -41,5 +41,5 @@ def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Seq
     goal = Goal.nothing(frames)
     for joint in joints:
         goal.positions[rows, joint] = positions[rows, joint]
-        goal.asked[rows, joint] = True
+        goal.mask[rows, joint] = True
     return replace(goal, start=ground_pose(positions[0]))

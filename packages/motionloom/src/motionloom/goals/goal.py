@@ -29,26 +29,26 @@ _ACROSS = list(SMPL22.resolve(["left_hip", "right_hip", "left_shoulder", "right_
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Targets for each frame. What is not asked may hold any finite number."""
+    """Targets for each frame. Where the mask is False the values may be any finite number."""
 
     positions: Array
     """(frames, 22, 3) metres in the world."""
-    asked: Flags
-    """(frames, 22, 3): which coordinates are asked; a path on the ground asks x and z of the pelvis (joint 0)."""
+    mask: Flags
+    """(frames, 22, 3): True at coordinates with a target; a path on the ground has x and z of the pelvis (joint 0)."""
     facing: Array
     """(frames,) radians."""
-    facing_asked: Flags
-    """(frames,)"""
+    facing_mask: Flags
+    """(frames,) True at the frames that have a target direction."""
     start: GroundPose | None = None
     """The ground pose at frame 0, where that is known; no target: without it `start_of` goes by the targets."""
 
     def __post_init__(self) -> None:
         frames = len(self.positions)
         shapes = (frames, len(SMPL22), 3), (frames, len(SMPL22), 3), (frames,), (frames,)
-        parts = (self.positions, self.asked, self.facing, self.facing_asked)
+        parts = (self.positions, self.mask, self.facing, self.facing_mask)
         if frames < 1 or any(part.shape != shape for part, shape in zip(parts, shapes, strict=True)):
             raise MotionloomError(f"a goal's parts do not fit each other: {[part.shape for part in parts]}")
-        if not (np.isfinite(self.positions[self.asked]).all() and np.isfinite(self.facing[self.facing_asked]).all()):
+        if not (np.isfinite(self.positions[self.mask]).all() and np.isfinite(self.facing[self.facing_mask]).all()):
             raise MotionloomError("a goal asks for a place that is not finite (NaN or infinity)")
 
     def __len__(self) -> int:
@@ -56,13 +56,13 @@ class Goal:
 
     @property
     def empty(self) -> bool:
-        """Whether nothing at all is asked."""
-        return not (self.asked.any() or self.facing_asked.any())
+        """Whether there is no target at all."""
+        return not (self.mask.any() or self.facing_mask.any())
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints that are asked anywhere, in the skeleton's order."""
-        return tuple(SMPL22.names[joint] for joint in np.flatnonzero(self.asked.any(axis=(0, 2))))
+        """Names of the joints that have a target anywhere, in the skeleton's order."""
+        return tuple(SMPL22.names[joint] for joint in np.flatnonzero(self.mask.any(axis=(0, 2))))
 
     def scaled(self, size: float) -> "Goal":
         """With every place so many times as far from the world's origin."""
@@ -80,7 +80,7 @@ class Goal:
         """The frames from ``first`` to before ``last``."""
         part = slice(first, last)
         start = self.start if first == 0 else None
-        return Goal(self.positions[part], self.asked[part], self.facing[part], self.facing_asked[part], start)
+        return Goal(self.positions[part], self.mask[part], self.facing[part], self.facing_mask[part], start)
 
     def padded(self, before: int, after: int) -> "Goal":
         """With so many frames without targets around it."""
@@ -90,12 +90,12 @@ class Goal:
             whole[part] = own
         return ends if before else replace(ends, start=self.start)
 
-    def seen_from(self, place: GroundPose) -> "Goal":
+    def relative_to(self, place: GroundPose) -> "Goal":
         """The same targets in coordinates in which ``place`` is the origin and faces +Z.
 
-        Single horizontal coordinates cannot be turned: both or none of x and z must be asked unless nothing turns.
+        Single horizontal coordinates cannot be turned: both or none of x and z must have a target unless nothing turns.
         """
-        if place.facing and (self.asked[..., 0] != self.asked[..., 2]).any():
+        if place.facing and (self.mask[..., 0] != self.mask[..., 2]).any():
             raise MotionloomError("a goal that asks for only one of x and z cannot be seen from another direction")
         return replace(
             self,
@@ -106,27 +106,27 @@ class Goal:
 
     def placed(self, place: GroundPose) -> "Goal":
         """The same targets, given in coordinates in which ``place`` is the origin facing +Z, in those of the world."""
-        return self.seen_from(place.inverse())
+        return self.relative_to(place.inverse())
 
 
 def start_of(goal: Goal) -> GroundPose:
     """The person's ground pose at frame 0: `Goal.start` or, without it, what the targets say.
 
-    The place is the pelvis's, the direction that of the facing asked at frame 0, else of the hips and shoulders asked
-    there, else the way that the pelvis's path sets out. What nobody asks is 0: the origin, facing +Z.
+    The place is the pelvis's, the direction that of the target facing at frame 0, else of the hips and shoulders with
+    targets there, else the way that the pelvis's path sets out. What no target says is 0: the origin, facing +Z.
     """
     if goal.start is not None:
         return goal.start
-    x, z = np.where(goal.asked[0, 0, [0, 2]], goal.positions[0, 0, [0, 2]], 0.0)
+    x, z = np.where(goal.mask[0, 0, [0, 2]], goal.positions[0, 0, [0, 2]], 0.0)
     return GroundPose(float(x), float(z), _first_facing(goal))
 
 
 def _first_facing(goal: Goal) -> float:
-    if goal.facing_asked[0]:
+    if goal.facing_mask[0]:
         return float(goal.facing[0])
-    if goal.asked[0, _ACROSS][:, [0, 2]].all():
+    if goal.mask[0, _ACROSS][:, [0, 2]].all():
         return ground_pose(goal.positions[0]).facing
-    on_path = np.flatnonzero(goal.asked[:, 0][:, [0, 2]].all(axis=-1))
+    on_path = np.flatnonzero(goal.mask[:, 0][:, [0, 2]].all(axis=-1))
     if len(on_path) == 0 or on_path[0] != 0:
         return 0.0
     way = goal.positions[on_path, 0][:, [0, 2]] - goal.positions[0, 0, [0, 2]]
@@ -137,15 +137,15 @@ def _first_facing(goal: Goal) -> float:
 def joined(first: Goal, second: Goal) -> Goal:
     """The targets of one stretch of frames and of the one behind it."""
     pairs = zip(_parts(first), _parts(second), strict=True)
-    positions, asked, facing, facing_asked = (np.concatenate(pair) for pair in pairs)
-    return Goal(positions, asked, facing, facing_asked, first.start)
+    positions, mask, facing, facing_mask = (np.concatenate(pair) for pair in pairs)
+    return Goal(positions, mask, facing, facing_mask, first.start)
 
 
 def merged(first: Goal, second: Goal) -> Goal:
     """The targets of both; MotionloomError where they ask for different places (`AGREE`), naming joint and time."""
     if len(first) != len(second):
         raise MotionloomError(f"goals of {len(first)} and {len(second)} frames cannot be put together")
-    both = first.asked & second.asked
+    both = first.mask & second.mask
     apart = np.where(both, np.abs(first.positions - second.positions), 0.0)
     if apart.max(initial=0.0) > AGREE:
         frame, joint, _ = np.unravel_index(int(apart.argmax()), apart.shape)
@@ -161,16 +161,16 @@ def merged(first: Goal, second: Goal) -> Goal:
 def overlaid(first: Goal, second: Goal) -> Goal:
     """The targets of both; those of the first where both ask for the same."""
     return Goal(
-        np.where(first.asked, first.positions, second.positions),
-        first.asked | second.asked,
-        np.where(first.facing_asked, first.facing, second.facing),
-        first.facing_asked | second.facing_asked,
+        np.where(first.mask, first.positions, second.positions),
+        first.mask | second.mask,
+        np.where(first.facing_mask, first.facing, second.facing),
+        first.facing_mask | second.facing_mask,
         second.start if first.start is None else first.start,
     )
 
 
 def _check_turns(first: Goal, second: Goal) -> None:
-    both = first.facing_asked & second.facing_asked
+    both = first.facing_mask & second.facing_mask
     apart = np.where(both, np.abs(turn_between(first.facing, second.facing)), 0.0)
     if apart.max(initial=0.0) > AGREE_TURN:
         frame = int(apart.argmax())
@@ -198,4 +198,4 @@ def turn_between(a: np.ndarray | float, b: np.ndarray | float) -> Array:
 
 
 def _parts(goal: Goal) -> tuple[np.ndarray, ...]:
-    return goal.positions, goal.asked, goal.facing, goal.facing_asked
+    return goal.positions, goal.mask, goal.facing, goal.facing_mask

@@ -66,19 +66,19 @@ class HeadMove:
 
 def read_head(text: str) -> HeadMove:
     """What words say of a head; raises `MotionloomError` for those that say nothing of it."""
-    said = in_digits(text)
-    often = re.search(r"\b(once|twice|thrice|(\d+) (?:times|nods|shakes))\b", said)
+    words = in_digits(text)
+    often = re.search(r"\b(once|twice|thrice|(\d+) (?:times|nods|shakes))\b", words)
     times = (int(often[2]) if often[2] else _OFTEN[often[1]]) if often else 0
-    pace = 1.5 if re.search(r"\bslow", said) else 0.7 if re.search(r"\b(?:quick|fast|rapid)", said) else 1.0
-    much = 0.5 if re.search(r"\b(?:slightly|a little|a bit)\b", said) else 1.0
-    if re.search(r"\bnod", said):
+    pace = 1.5 if re.search(r"\bslow", words) else 0.7 if re.search(r"\b(?:quick|fast|rapid)", words) else 1.0
+    much = 0.5 if re.search(r"\b(?:slightly|a little|a bit)\b", words) else 1.0
+    if re.search(r"\bnod", words):
         return HeadMove("nods", 0.0, -20.0 * much, times, pace)
-    if re.search(r"\bsh(?:ak|ook)", said):
+    if re.search(r"\bsh(?:ak|ook)", words):
         return HeadMove("shakes", 25.0 * much, 0.0, times, pace)
-    if re.search(r"\baround|\bboth (?:ways|sides)|\bside to side|\bleft and right|\bleft then right", said):
+    if re.search(r"\baround|\bboth (?:ways|sides)|\bside to side|\bleft and right|\bleft then right", words):
         return HeadMove("looks around", 55.0 * much, 0.0, times, pace)
-    found = [degrees for words, degrees in _TO if re.search(words, said)]
-    if not found:
+    turns = [degrees for pattern, degrees in _TO if re.search(pattern, words)]
+    if not turns:
         raise MotionloomError(f"a head {KNOWN}; {text.strip()[:60]!r} says none of these")
-    left, up = np.sum(found, axis=0).tolist()
+    left, up = np.sum(turns, axis=0).tolist()
     return HeadMove("looks", left * much, up * much, 0, pace)

@@ -19,36 +19,36 @@ class LinedFile:
     places: tuple[str, ...] = field(default=(), kw_only=True)
     """Of values that come from no file: what leads to each, by its number (`lined_of`)."""
 
-    def mapping(self, found: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
+    def mapping(self, node: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
         """The values by key; no key but ``keys``. what: the mapping, in words."""
-        if not isinstance(found.value, dict):
-            self.fail(found.line, f"{what} must be a mapping with {listed(keys)}; got {self.got(found)}")
-        for key, value in found.value.items():
+        if not isinstance(node.value, dict):
+            self.fail(node.line, f"{what} must be a mapping with {listed(keys)}; got {self.kind(node)}")
+        for key, value in node.value.items():
             if key not in keys:
                 self.fail(value.key_line, f"unknown key {shown(key)}{meant(key, keys)}; {what} has {listed(keys)}")
-        return found.value
+        return node.value
 
-    def items(self, found: Lined, name: str, *, of: str = "entry", most: int = MAX_ITEMS) -> list[Lined]:
+    def items(self, node: Lined, name: str, *, of: str = "entry", most: int = MAX_ITEMS) -> list[Lined]:
         """The entries of a list, at least one. of: what one is, in a word."""
-        if not isinstance(found.value, list) or not found.value:
-            got = "an empty list" if found.value == [] else found.kind
-            self.fail(found.line, f"'{name}' must be a list with at least one {of}; got {got}")
-        if len(found.value) > most:
-            self.fail(found.line, f"'{name}' has {len(found.value):,} entries; at most {most:,} are read")
-        return found.value
+        if not isinstance(node.value, list) or not node.value:
+            got = "an empty list" if node.value == [] else node.kind
+            self.fail(node.line, f"'{name}' must be a list with at least one {of}; got {got}")
+        if len(node.value) > most:
+            self.fail(node.line, f"'{name}' has {len(node.value):,} entries; at most {most:,} are read")
+        return node.value
 
-    def field(self, given: Mapping[str, Lined], keys: Mapping[str, Spec], name: str) -> Any:
+    def field(self, entries: Mapping[str, Lined], keys: Mapping[str, Spec], name: str) -> Any:
         """The value of one of the keys, as its field holds it; None where nothing is written."""
-        if (found := given.get(name)) is None:
+        if (node := entries.get(name)) is None:
             return None
         try:
-            return keys[name].check(found.plain(), repr(name))
+            return keys[name].check(node.plain(), repr(name))
         except MotionloomError as error:
-            self.fail(found.line, str(error))
+            self.fail(node.line, str(error))
 
-    def got(self, found: Lined) -> str:
-        """What is there, for messages."""
-        return found.kind
+    def kind(self, node: Lined) -> str:
+        """The kind of a value, for messages."""
+        return node.kind
 
     def fail(self, line: int, message: str) -> NoReturn:
         """Raise a `MotionloomError` that names file and line, or the keys that lead there."""

@@ -39,16 +39,16 @@ def read_mask(path: Path | str, *, fps: float) -> tuple[FixedPart, ...]:
 
 def check_names(names: Iterable[str]) -> tuple[str, ...]:
     """The names, if all are of joints, groups or the root; raises `MotionloomError` that lists what there is."""
-    found = tuple(names)
-    if not found:
+    known = tuple(names)
+    if not known:
         raise MotionloomError(f"no joint is named; there are {', '.join(MASK_JOINTS)}")
-    for name in found:
+    for name in known:
         if problem := _name_problem(name):
             raise MotionloomError(problem)
-    return found
+    return known
 
 
-def all_held(parts: Sequence[FixedPart], seconds: float) -> bool:
+def fixes_everything(parts: Sequence[FixedPart], seconds: float) -> bool:
     """Whether all 22 joints are held at every moment from 0 to ``seconds``, so that nothing is left to predict."""
     spans: dict[int, list[tuple[float, float]]] = {joint: [] for joint in range(len(SMPL22))}
     for part in parts:
@@ -86,27 +86,27 @@ class _Reader(LinedFile):
     def part(self, item: Lined) -> FixedPart:
         from motionloom.goals.hold import FixedPart
 
-        given = self.mapping(item, tuple(PART), "a held part")
-        if "joints" not in given:
+        entries = self.mapping(item, tuple(PART), "a held part")
+        if "joints" not in entries:
             self.fail(item.line, "a held part has no 'joints'; name joints, groups or root")
-        names = tuple(self.joint(one) for one in self.items(given["joints"], "joints", most=PART["joints"].many))
-        if "frames" in given:
-            if "from" in given or "to" in given:
-                self.fail(given["frames"].key_line, "a held part has either 'frames' or 'from' and 'to', not both")
-            rows = self.items(given["frames"], "frames", most=PART["frames"].many)
+        names = tuple(self.joint(one) for one in self.items(entries["joints"], "joints", most=PART["joints"].many))
+        if "frames" in entries:
+            if "from" in entries or "to" in entries:
+                self.fail(entries["frames"].key_line, "a held part has either 'frames' or 'from' and 'to', not both")
+            rows = self.items(entries["frames"], "frames", most=PART["frames"].many)
             return FixedPart(names, tuple(self.stretch(row) for row in rows))
-        begin, end = (self.field(given, PART, name) for name in ("from", "to"))
+        begin, end = (self.field(entries, PART, name) for name in ("from", "to"))
         begin, end = begin or 0.0, math.inf if end is None else end
         if end <= begin:
-            self.fail(given["to"].line, f"'to' must be after 'from', {begin:g} s; got {end:g}")
+            self.fail(entries["to"].line, f"'to' must be after 'from', {begin:g} s; got {end:g}")
         return FixedPart(names, ((begin, end),))
 
-    def joint(self, found: Lined) -> str:
-        if not isinstance(found.value, str):
-            self.fail(found.line, f"a joint is named by a word; got {found.kind}")
-        if problem := _name_problem(found.value):
-            self.fail(found.line, problem)
-        return found.value
+    def joint(self, node: Lined) -> str:
+        if not isinstance(node.value, str):
+            self.fail(node.line, f"a joint is named by a word; got {node.kind}")
+        if problem := _name_problem(node.value):
+            self.fail(node.line, problem)
+        return node.value
 
     def stretch(self, row: Lined) -> tuple[float, float]:
         """Two frames as seconds: frame k lies (k + 1) / fps behind the past's end; a stretch ends beside a frame."""
@@ -117,8 +117,8 @@ class _Reader(LinedFile):
             self.fail(row.line, f"frames [{first}, {behind}] end before they begin; the second is the one behind them")
         return (first + BESIDE) / self.fps if first else 0.0, (behind + BESIDE) / self.fps
 
-    def frame(self, found: Lined) -> int:
-        value = found.value
+    def frame(self, node: Lined) -> int:
+        value = node.value
         if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_FRAME:
-            self.fail(found.line, f"a frame is a whole number of 0 to {MAX_FRAME:,}; got {found.kind}")
+            self.fail(node.line, f"a frame is a whole number of 0 to {MAX_FRAME:,}; got {node.kind}")
         return value

@@ -23,20 +23,20 @@ def in_digits(text: str, *, lower: bool = True) -> str:
 
     In lower case, blanks and commas as single blanks; ``lower`` False leaves both as they are.
     """
-    said = " ".join(text.lower().replace(",", " ").split()) if lower else text
-    said = _WORDS.sub(_value, said)
-    said = _HALF.sub(lambda found: f"{float(found[1]) + 0.5:g}", said)
-    said = re.sub(r"\bhalf an? (?=m(?:et|in)|second|foot|yard)", "0.5 ", said)
-    said = re.sub(r"\ba couple of (?=m(?:et|in)|second|feet|yard|step)|\ba pair of (?=step)", "2 ", said)
-    said = re.sub(r"\b(?:about|around|approximately|roughly|exactly|some) (?=\d)", "", said)
-    return re.sub(r"\bfor an? (?=(?:full |whole )?(?:minute|second)\b)(?:full |whole )?", "for 1 ", said)
+    result = " ".join(text.lower().replace(",", " ").split()) if lower else text
+    result = _WORDS.sub(_value, result)
+    result = _HALF.sub(lambda found: f"{float(found[1]) + 0.5:g}", result)
+    result = re.sub(r"\bhalf an? (?=m(?:et|in)|second|foot|yard)", "0.5 ", result)
+    result = re.sub(r"\ba couple of (?=m(?:et|in)|second|feet|yard|step)|\ba pair of (?=step)", "2 ", result)
+    result = re.sub(r"\b(?:about|around|approximately|roughly|exactly|some) (?=\d)", "", result)
+    return re.sub(r"\bfor an? (?=(?:full |whole )?(?:minute|second)\b)(?:full |whole )?", "for 1 ", result)
 
 
-def _value(found: re.Match[str]) -> str:
-    if found["plain"]:
-        return str(_below_100(found["plain"]))
-    number = 100 * _SMALL.get(found["hundreds"], 1)
-    return str(number + (_below_100(found["rest"]) if found["rest"] else 0))
+def _value(match: re.Match[str]) -> str:
+    if match["plain"]:
+        return str(_below_100(match["plain"]))
+    number = 100 * _SMALL.get(match["hundreds"], 1)
+    return str(number + (_below_100(match["rest"]) if match["rest"] else 0))
 
 
 def _below_100(words: str) -> int:

@@ -18,7 +18,7 @@ from motionloom.requests.goal import CURVES
 Array = NDArray[np.float64]
 
 WALKING = 1.2
-"""Metres per second of somebody who is not asked how fast."""
+"""Metres per second of somebody for whom no speed is requested."""
 FASTEST = 12.0
 """Metres per second: nobody runs faster."""
 STANDING = 0.02
@@ -169,10 +169,10 @@ def root_path(
         way = through(points, reached, at, smooth=smooth)
     goal = Goal.nothing(frames)
     goal.positions[first : last + 1, 0, 0], goal.positions[first : last + 1, 0, 2] = way.T
-    goal.asked[first : last + 1, 0, 0] = goal.asked[first : last + 1, 0, 2] = True
+    goal.mask[first : last + 1, 0, 0] = goal.mask[first : last + 1, 0, 2] = True
     if facing != "free" and not (facing == "along" and np.ptp(way, axis=0).max() < 1e-3):
         goal.facing[first : last + 1] = _facing(facing, way, reached, at, fps)
-        goal.facing_asked[first : last + 1] = True
+        goal.facing_mask[first : last + 1] = True
     return goal
 
 

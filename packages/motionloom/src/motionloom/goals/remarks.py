@@ -1,4 +1,4 @@
-"""What is said of words before anything is drawn: how they are read, that they are not English or not known."""
+"""Remarks on words before anything is generated: how they are read, that they are not English or not known."""
 
 import re
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Remark:
-    """What is said of some words."""
+    """A remark on some words."""
 
     text: str
     line: str
@@ -49,11 +49,11 @@ _SMALL = frozenset(
 
 def numbers_read(timeline: "Timeline") -> str:
     """A line with the numbers that were read in the words of a timeline, and the seconds of each; empty for none."""
-    said = [
+    readings = [
         f"{one.amount}, {sum(segment.seconds for segment in timeline.segments[one.first : one.end]):g} s"
         for one in timeline.readings
     ]
-    return f"read as: {'; '.join(said)}" if said else ""
+    return f"read as: {'; '.join(readings)}" if readings else ""
 
 
 def parts_read(timeline: "Timeline") -> str:
@@ -71,24 +71,24 @@ def remarks_on_two(
 ) -> list[Remark]:
     """Remarks on the words of two people: who is read to do what, and what neither block nor prior has learned.
 
-    texts: one per segment. block_known: what the block says that it knows; None: of pairs nothing is said. known: what
+    texts: one per segment. block_known: what the block knows; None: no remarks on pairs. known: what
     the prior knows. Raises `MotionloomError` as the encoder does.
     """
-    asked = {text: prompts_of(text) for text in texts if text.strip()}
+    prompts = {text: prompts_of(text) for text in texts if text.strip()}
     remarks = []
-    for text, said in asked.items():
+    for text, said in prompts.items():
         if MARK not in text and said[0] != said[1]:
             remarks.append(Remark(text, f"read as: '{said[0]} {MARK} {said[1]}'"))
         contact = read_contact(said)
         remarks += [] if contact is None else [Remark(text, f"read as: {contact}")]
-    if block_known is not None and asked:
-        found = nearest(block_known, [without_two(text) for text in asked], encoder)
+    if block_known is not None and prompts:
+        matches = nearest(block_known, [without_two(text) for text in prompts], encoder)
         remarks += [
             Remark(text, f"of two people {one.remark()}", one.sentences)
-            for text, one in zip(asked, found, strict=True)
+            for text, one in zip(prompts, matches, strict=True)
             if not one.near
         ]
-    return remarks + remarks_on([prompt for said in asked.values() for prompt in said], known, encoder)
+    return remarks + remarks_on([prompt for said in prompts.values() for prompt in said], known, encoder)
 
 
 def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> list[Remark]:
@@ -97,19 +97,19 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) 
     known: None where a weight file has no such table. The texts without a remark are left out. Raises `MotionloomError`
     as the encoder does.
     """
-    asked = [text for text in dict.fromkeys(texts) if text.strip()]
-    english = [text for text in asked if is_english(text)]
+    distinct = [text for text in dict.fromkeys(texts) if text.strip()]
+    english = [text for text in distinct if is_english(text)]
     remarks = [
         Remark(text, f"{text[:60]!r} does not look like English, and these weights know nothing else")
-        for text in asked
+        for text in distinct
         if text not in english
     ]
-    found = looked_up(english, known, encoder) if known else []
-    return remarks + [Remark(one.prompt, one.remark(), one.sentences) for one in found if not one.near]
+    matches = nearest_known(english, known, encoder) if known else []
+    return remarks + [Remark(one.prompt, one.remark(), one.sentences) for one in matches if not one.near]
 
 
-def looked_up(texts: Sequence[str], known: Known, encoder: TextEncoder) -> list[Nearest]:
-    """The nearest known sentences of each text, its verb looked at; `Nearest.near` says whether it is known."""
+def nearest_known(texts: Sequence[str], known: Known, encoder: TextEncoder) -> list[Nearest]:
+    """The nearest known sentences of each text, by its words and its verb; `Nearest.near` says whether it is known."""
     return nearest(known, texts, encoder, verbs=[verb_words(text) for text in texts])
 
 
@@ -118,9 +118,9 @@ def verb_words(text: str) -> tuple[str, ...]:
 
     The first word behind the subject, small words and adverbs aside; of "plays golf" the word behind it.
     """
-    said = bare(text)
-    subject = subject_of(said)
-    rest = said[len(subject) :] if len(said) > len(subject) else said
+    sentence = bare(text)
+    subject = subject_of(sentence)
+    rest = sentence[len(subject) :] if len(sentence) > len(subject) else sentence
     words = [word for word in re.findall(r"[a-z]+(?:-[a-z]+)*", rest) if word not in _SMALL and not word.endswith("ly")]
     first, *more = words or [""]
     if stem(first) in _LIGHT:

@@ -29,22 +29,22 @@ def prompts_of(prompt: str | tuple[str, str]) -> tuple[str, str]:
     one does and what the other does; any other is for both. Raises MotionloomError for a part without words."""
     if isinstance(prompt, tuple):
         return prompt
-    said = [words.strip() for words in prompt.split(MARK)]
-    if len(said) == 1:
+    prompts = [words.strip() for words in prompt.split(MARK)]
+    if len(prompts) == 1:
         return read_roles(prompt) or (prompt, prompt)
-    if len(said) > 2 or not all(said):
+    if len(prompts) > 2 or not all(prompts):
         raise MotionloomError(f"the prompt {prompt[:60]!r} must have words for each person around one {MARK}")
-    return said[0], said[1]
+    return prompts[0], prompts[1]
 
 
 def read_roles(text: str) -> tuple[str, str] | None:
     """What each of two people does, where one sentence says it of one and of the other; None where it does not."""
-    said = " ".join(text.split()).rstrip(" .!")
-    first = _FIRST.match(said.lower())
-    second = _SECOND.search(said.lower(), first.end()) if first else None
+    sentence = " ".join(text.split()).rstrip(" .!")
+    first = _FIRST.match(sentence.lower())
+    second = _SECOND.search(sentence.lower(), first.end()) if first else None
     if first is None or second is None:
         return None
-    does = said[first.end() : second.start()], said[second.end() :]
+    does = sentence[first.end() : second.start()], sentence[second.end() :]
     if _ALIKE.match(does[1].lower()):
         return None
     return f"a {first[1] or first[2] or 'person'} {does[0]}", f"a {second[1] or 'person'} {does[1]}"

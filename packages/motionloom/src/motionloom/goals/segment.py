@@ -25,10 +25,10 @@ class Segment:
     goal: Goal | None = None
     """Targets for the frames of this segment, seen from the person's ground pose when it begins (origin, facing +Z)."""
     adapters: tuple[Applied, ...] = ()
-    """What was taught from clips, for this segment alone: adapters or their files, each with a factor."""
+    """Adapters trained on clips, or their files, each with a factor, for this segment alone."""
 
     def __post_init__(self) -> None:
-        said = f"the segment {self.text[:40]!r}"
+        subject = f"the segment {self.text[:40]!r}"
         limits = (
             ("seconds", self.seconds, LONGEST),
             ("transition", self.transition, LONGEST),
@@ -36,7 +36,9 @@ class Segment:
         )
         for name, value, most in limits:
             if value is not None and not abs(value) <= most:
-                raise MotionloomError(f"{said} has {name} {kind_of(value)}; give a number, at most {most:g}")
+                raise MotionloomError(f"{subject} has {name} {kind_of(value)}; give a number, at most {most:g}")
         frames = round(self.seconds * FPS)
         if self.goal is not None and len(self.goal) != frames:
-            raise MotionloomError(f"{said} has {frames} frames and its goal {len(self.goal)}; make them equally long")
+            raise MotionloomError(
+                f"{subject} has {frames} frames and its goal {len(self.goal)}; make them equally long"
+            )

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motionloom.goals.amounts import read_amount, read_seconds
-from motionloom.goals.elided import completed
+from motionloom.goals.ellipsis import resolve_ellipsis
 from motionloom.goals.verbs import (
     MOODS,
     NOUNS_AFTER,
@@ -32,7 +32,7 @@ MOST_PARTS = 20
 SHORTEST = 1.2
 """Seconds of the shortest part."""
 LONGEST = 12.0
-"""Seconds of the longest part by nature; more is asked for in numbers."""
+"""Seconds of the longest part by nature; a longer one is requested in numbers."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ _THEN = re.compile(
     r"|\s*[.;]\s+(?=\S)",
     re.IGNORECASE,
 )
-_KEPT = re.compile(
+_NO_SEPARATOR = re.compile(
     r"\b(?:now|every now|first|only|just|since|until|till|by|back|next to|(?<!the )right|what) (?:and )?then\b", re.I
 )
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
@@ -121,46 +121,46 @@ def split_actions(text: str) -> tuple[Part, ...]:
     left whole too.
     """
     whole = " ".join(text.split()).rstrip(" .;,")
-    clauses = [clause for found in _by_time(whole) for clause in _by_then(found)]
+    clauses = [clause for sentence in _split_by_time(whole) for clause in _split_by_then(sentence)]
     if len(clauses) > 1:
         clauses[0] = re.sub(r"^first,? (?=\w+ \w)|,? first$", "", clauses[0], flags=re.IGNORECASE)
     subject = subject_of(clauses[0]) if clauses else ""
     parts: list[str] = []
     for number, clause in enumerate(clauses):
         own = subject_of(clause)
-        said = clause if not own or number == 0 else PRONOUN.sub("", clause)
-        if own.lower() == "they" and said != clause and mood_of(clauses[0]) == "third":
-            said = finite(said, of="base")  # "a person walks. Then they kick."
-        own = own if said == clause else ""
+        words = clause if not own or number == 0 else PRONOUN.sub("", clause)
+        if own.lower() == "they" and words != clause and mood_of(clauses[0]) == "third":
+            words = finite(words, of="base")  # "a person walks. Then they kick."
+        own = own if words == clause else ""
         named = own or subject
-        rest = said[len(own) :].strip()
+        rest = words[len(own) :].strip()
         lasting = re.sub(r"^(?:is|are|was|were) (?=\w+ing\b)", "", rest)
         if verb_of(lasting, "gerund"):
             rest = lasting if lasting != rest or not own else finite(rest)
         if not named and mood_of(rest) == "gerund":
             named = "a person"
-        items = [rest] if _SUBORDINATE.search(named) else _list(rest)  # "a guard who walks and stops is bored"
+        items = [rest] if _SUBORDINATE.search(named) else _split_list(rest)  # "a guard who walks and stops is bored"
         parts += [_sentence(named, finite(item)) for item in items]
-    parts = completed(parts)
+    parts = resolve_ellipsis(parts)
     if not 1 < len(parts) <= MOST_PARTS:
         return (Part(text, natural_seconds(text)),)
     last = len(parts) - 1
-    timed = [Part(part, _briefly(part) if i < last else natural_seconds(part)) for i, part in enumerate(parts)]
-    rested = _with_rests(timed)
+    timed = [Part(part, _part_seconds(part) if i < last else natural_seconds(part)) for i, part in enumerate(parts)]
+    rested = _merge_rests(timed)
     return tuple(rested) if len(rested) > 1 else (Part(text, rested[0].seconds),)
 
 
-def _with_rests(parts: Sequence[Part]) -> list[Part]:
-    """Parts in which a posture lasts as long as the rest that is said to follow it: "sits down and waits"."""
-    found: list[Part] = []
+def _merge_rests(parts: Sequence[Part]) -> list[Part]:
+    """Parts in which a posture lasts as long as the rest that follows it: "sits down and waits"."""
+    result: list[Part] = []
     for part in parts:
         lasts = _LASTS.match(part.text.removeprefix(subject_of(part.text)).strip())
-        if lasts and found and _is_posture(found[-1].text):
-            both = found[-1].seconds + part.seconds
-            found[-1] = Part(found[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
+        if lasts and result and _is_posture(result[-1].text):
+            both = result[-1].seconds + part.seconds
+            result[-1] = Part(result[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
         else:
-            found.append(part)
-    return found
+            result.append(part)
+    return result
 
 
 def _is_posture(part: str) -> bool:
@@ -189,29 +189,29 @@ def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float =
 
 def natural_seconds(text: str) -> float:
     """How long an action takes people, by its kind, its numbers and how quickly it is done; 1.2 to 12 s."""
-    said = text.lower()
-    if (asked := read_seconds(text)) is not None:
-        return max(asked, SHORTEST)
-    kind = next((kind_of_verb(word, said) for word in re.findall(r"[a-z]+", said) if base_of(word)), "other")
+    words = text.lower()
+    if (explicit := read_seconds(text)) is not None:
+        return max(explicit, SHORTEST)
+    kind = next((kind_of_verb(word, words) for word in re.findall(r"[a-z]+", words) if base_of(word)), "other")
     seconds = _SECONDS[kind]
-    if found := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", said):
-        seconds = 1.0 + 0.6 * (_count(found[1]) or 3)
-    elif found := re.search(r"\b(\d+|[a-z]+) times\b", said):
-        seconds *= 0.4 + 0.6 * (_count(found[1]) or 2)
-    elif re.search(r"\b(twice|thrice)\b", said):
-        seconds *= 1.6 if "twice" in said else 2.2
-    elif found := _REPEATED.search(said):
-        seconds *= 0.4 + 0.6 * (_count(found[1]) or 2)
-    if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", said):
+    if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
+        seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
+    elif match := re.search(r"\b(\d+|[a-z]+) times\b", words):
+        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
+    elif re.search(r"\b(twice|thrice)\b", words):
+        seconds *= 1.6 if "twice" in words else 2.2
+    elif match := _REPEATED.search(words):
+        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
+    if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", words):
         seconds = max(seconds, 6.0)
-    if re.search(r"\b(slowly|slow|carefully|gently)\b", said):
+    if re.search(r"\b(slowly|slow|carefully|gently)\b", words):
         seconds *= 1.3
-    elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", said):
+    elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", words):
         seconds *= 0.8
     return float(min(max(seconds, SHORTEST), LONGEST))
 
 
-def _briefly(part: str) -> float:
+def _part_seconds(part: str) -> float:
     """How long a part takes behind which another comes: who stops to do something stops briefly."""
     done = part.removeprefix(subject_of(part)).strip()
     stops = verb_of(done, mood_of(done)) in ("stop", "halt", "pause", "freeze") and " for " not in done
@@ -221,23 +221,23 @@ def _briefly(part: str) -> float:
 # Clauses
 
 
-def _by_time(text: str) -> list[str]:
+def _split_by_time(text: str) -> list[str]:
     """Clauses joined by "before" and "after", in the order in which they happen."""
-    if found := re.match(r"(before|after)\s+([^,]+?)\s*,\s*(.+)$", text, re.IGNORECASE):
-        inner, main = found[2], found[3]
+    if match := re.match(r"(before|after)\s+([^,]+?)\s*,\s*(.+)$", text, re.IGNORECASE):
+        inner, main = match[2], match[3]
         if _is_clause(inner):
-            order = [main, inner] if found[1].lower() == "before" else [inner, main]
-            return [clause for one in _named_alike(order, main) for clause in _by_time(one)]
-    for found in re.finditer(r"\s*,?\s+(before|after)\s+", text, re.IGNORECASE):
-        main, inner = text[: found.start()], text[found.end() :]
+            order = [main, inner] if match[1].lower() == "before" else [inner, main]
+            return [clause for one in _with_subject(order, main) for clause in _split_by_time(one)]
+    for match in re.finditer(r"\s*,?\s+(before|after)\s+", text, re.IGNORECASE):
+        main, inner = text[: match.start()], text[match.end() :]
         if _is_clause(inner) and main.strip():
-            inner = _named_alike([inner], main)[0]
-            order = [main, inner] if found[1].lower() == "before" else [inner, main]
-            return [order[0], *_by_time(order[1])] if found[1].lower() == "before" else order
+            inner = _with_subject([inner], main)[0]
+            order = [main, inner] if match[1].lower() == "before" else [inner, main]
+            return [order[0], *_split_by_time(order[1])] if match[1].lower() == "before" else order
     return [text]
 
 
-def _named_alike(clauses: list[str], main: str) -> list[str]:
+def _with_subject(clauses: list[str], main: str) -> list[str]:
     """Clauses with the subject of ``main`` where they have none or a pronoun, their verbs finite as there."""
     subject, mood = subject_of(main), mood_of(main)
     result = []
@@ -249,24 +249,24 @@ def _named_alike(clauses: list[str], main: str) -> list[str]:
     return result
 
 
-def _by_then(text: str) -> list[str]:
+def _split_by_then(text: str) -> list[str]:
     """Clauses parted by "then" and its like."""
-    kept = [(found.start(), found.end()) for found in _KEPT.finditer(text)]
+    exempt = [(match.start(), match.end()) for match in _NO_SEPARATOR.finditer(text)]
     cuts = [
-        found
-        for found in _THEN.finditer(text)
-        if not any(begin < found.end() and found.start() < end for begin, end in kept)
+        match
+        for match in _THEN.finditer(text)
+        if not any(begin < match.end() and match.start() < end for begin, end in exempt)
     ]
     pieces, at = [], 0
     for cut in cuts:
         pieces.append(text[at : cut.start()])
         at = cut.end()
     pieces.append(text[at:])
-    found = [re.sub(r"^(?:and|then)\s+", "", piece.strip(" ,.;"), flags=re.I).strip() for piece in pieces]
-    return [piece for piece in found if piece]
+    clauses = [re.sub(r"^(?:and|then)\s+", "", piece.strip(" ,.;"), flags=re.I).strip() for piece in pieces]
+    return [clause for clause in clauses if clause]
 
 
-def _list(clause: str) -> list[str]:
+def _split_list(clause: str) -> list[str]:
     """The items of a list of verbs, if they follow each other; else the clause alone."""
     if _AT_ONCE.search(clause) or not clause:
         return [clause] if clause else []
@@ -276,7 +276,7 @@ def _list(clause: str) -> list[str]:
     for join, piece in zip(tokens[1::2], tokens[2::2], strict=True):
         piece = PRONOUN.sub("", piece)
         thing = mood != "base" and _is_thing(items[-1], join)  # "do squats and lunges" has no second verb
-        if mood and verb_of(piece, mood) and not thing and not _belongs(items[-1], join, piece):
+        if mood and verb_of(piece, mood) and not thing and not _is_subordinate(items[-1], join, piece):
             items.append(piece)
             joins.append(join)
         else:
@@ -332,7 +332,7 @@ def _is_thing(item: str, join: str) -> bool:
     return base in NOUNS_AFTER and "," not in join and bool(re.search(r"\w+s$", item)) and len(rest.split(" ")) <= 4
 
 
-def _belongs(item: str, join: str, piece: str) -> bool:
+def _is_subordinate(item: str, join: str, piece: str) -> bool:
     """Whether what follows is of the clause of time, place or reason before, or the end of counted steps."""
     if _COUNTED.search(item) and _STOPS.fullmatch(piece.strip()):
         return True

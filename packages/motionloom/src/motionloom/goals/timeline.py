@@ -49,7 +49,7 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """What `motionloom.tasks.long.compose` is asked, as read from a file."""
+    """A request to `motionloom.tasks.long.compose`, as read from a file."""
 
     segments: tuple[Segment, ...]
     seed: int | None = None
@@ -139,7 +139,7 @@ def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition
     return Timeline(tuple(Segment(text, seconds, transition=shared) for text in texts))
 
 
-def whole(text: str, seconds: float) -> Timeline:
+def single_segment(text: str, seconds: float) -> Timeline:
     """One segment, of any length that one motion may have."""
     from motionloom.goals.segment import Segment
 
@@ -152,7 +152,7 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
     seconds: of the whole, shared out as the actions' own lengths are; None: those lengths. A sentence that says one
     thing, or several at once, is one segment of 5 s. amounts: numbers with units in the words become lengths and goals
     of their segments (`motionloom.goals.amounts`). metre: as of `goal_file.read_goal`, of metres in the words. Raises
-    `MotionloomError` for what cannot be asked.
+    `MotionloomError` for an impossible request.
     """
     from motionloom.goals.sequence import split_actions
 
@@ -161,24 +161,24 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
     parts = split_actions(text)
     if amounts:
         return _with_amounts(text, parts, seconds, metre)
-    return _of_parts(text, parts, seconds)
+    return _timeline_of_parts(text, parts, seconds)
 
 
 def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre: float) -> Timeline:
-    """As long as the numbers in the words need, with their goals; without one as `_of_parts`."""
+    """As long as the numbers in the words need, with their goals; without one as `_timeline_of_parts`."""
     from motionloom.goals.amount_goal import seconds_for
     from motionloom.goals.amounts import read_amount, read_seconds
 
     read = [amount and replace(amount, metre=metre) for amount in (read_amount(part.text) for part in parts)]
-    found = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
-    own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, found, strict=True)]
+    amounts = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
+    own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, amounts, strict=True)]
     if not any(own):
-        return _of_parts(text, parts, seconds)
+        return _timeline_of_parts(text, parts, seconds)
     natural = [replace(part, seconds=length or part.seconds) for part, length in zip(parts, own, strict=True)]
     if seconds is None and len(parts) == 1:
         seconds = min(natural[0].seconds, LONGEST)
     segments, readings = [], []
-    for segment, amount in zip(_of_parts(text, natural, seconds).segments, found, strict=True):
+    for segment, amount in zip(_timeline_of_parts(text, natural, seconds).segments, amounts, strict=True):
         several = (segment,) if amount is None else with_amount(segment, amount)
         if amount is not None:
             readings.append(Reading(amount, len(segments), len(segments) + len(several)))
@@ -192,22 +192,22 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
     share: of the way of steps, and of the time of a stroke, where another than the usual comes nearer to the number.
     """
     from motionloom.goals.amount_goal import CHAINED, STROKES, goal_for
-    from motionloom.goals.amounts import once
+    from motionloom.goals.amounts import single_stroke
 
     if amount.kind != "count":
-        asked = replace(amount, stride=amount.stride * share)
-        return (replace(segment, goal=goal_for(asked, segment.seconds)),)
+        scaled = replace(amount, stride=amount.stride * share)
+        return (replace(segment, goal=goal_for(scaled, segment.seconds)),)
     assert amount.of is not None
-    text, number = once(segment.text), int(amount.size)
+    text, number = single_stroke(segment.text), int(amount.size)
     stroke, each = STROKES[amount.of] * share, segment.seconds / number
     if STROKES[amount.of] < CHAINED:
-        return (replace(segment, text=text, seconds=_whole(min(segment.seconds, LONGEST) * share)),)
-    stroke = _whole(min(stroke, each * share))
+        return (replace(segment, text=text, seconds=_in_whole_frames(min(segment.seconds, LONGEST) * share)),)
+    stroke = _in_whole_frames(min(stroke, each * share))
     between = min(TRANSITION, segment.transition, stroke / 2)
     return (replace(segment, text=text, seconds=stroke, transition=between),) * number
 
 
-def _of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
+def _timeline_of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
     from motionloom.goals.segment import Segment
     from motionloom.goals.sequence import lengths
 
@@ -228,7 +228,7 @@ def _of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeli
     )
 
 
-def _whole(seconds: float) -> float:
+def _in_whole_frames(seconds: float) -> float:
     """Seconds in whole frames."""
     return max(1, _frames(seconds)) / FPS
 
@@ -287,37 +287,37 @@ class _Reader(LinedFile):
     def row(self, item: Lined) -> _Row:
         if isinstance(item.value, str):
             return _Row(item.line, self.text(item))
-        given = self.mapping(item, tuple(SEGMENT), "a segment")
-        if "text" not in given:
+        entries = self.mapping(item, tuple(SEGMENT), "a segment")
+        if "text" not in entries:
             self.fail(item.line, "a segment has no 'text'; say in words what the person does")
-        if "goal" in given and "goals" in given:
-            self.fail(given["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
-        seconds = self.field(given, SEGMENT, "seconds")
-        transition = given.get("transition")
+        if "goal" in entries and "goals" in entries:
+            self.fail(entries["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
+        seconds = self.field(entries, SEGMENT, "seconds")
+        transition = entries.get("transition")
         return _Row(
             item.line,
-            self.text(given["text"]),
+            self.text(entries["text"]),
             SECONDS if seconds is None else seconds,
-            self.field(given, SEGMENT, "guidance"),
-            self.field(given, SEGMENT, "transition"),
+            self.field(entries, SEGMENT, "guidance"),
+            self.field(entries, SEGMENT, "transition"),
             transition.line if transition else 0,
-            self.goals(given),
-            self.adapters(given.get("adapters")),
+            self.goals(entries),
+            self.adapters(entries.get("adapters")),
         )
 
-    def adapters(self, found: Lined | None) -> tuple[tuple[Path, float], ...]:
+    def adapters(self, node: Lined | None) -> tuple[tuple[Path, float], ...]:
         """``FILE`` or ``FILE:FACTOR``, one or a list of them; the files lie in the timeline's folder."""
-        if found is None:
+        if node is None:
             return ()
         from motionloom.goals.adapters import MOST_ADAPTERS, parse_adapter
 
-        given = [found] if isinstance(found.value, str) else self.items(found, "adapters", of="adapter")
-        if len(given) > MOST_ADAPTERS:
-            self.fail(found.line, f"{len(given)} adapters at once are too many; at most {MOST_ADAPTERS}")
+        items = [node] if isinstance(node.value, str) else self.items(node, "adapters", of="adapter")
+        if len(items) > MOST_ADAPTERS:
+            self.fail(node.line, f"{len(items)} adapters at once are too many; at most {MOST_ADAPTERS}")
         result = []
-        for one in given:
+        for one in items:
             if not isinstance(one.value, str):
-                self.fail(one.line, f"an adapter is written FILE or FILE:FACTOR; got {self.got(one)}")
+                self.fail(one.line, f"an adapter is written FILE or FILE:FACTOR; got {self.kind(one)}")
             try:
                 name, factor = parse_adapter(one.value)
                 result.append((Field(str(name), "adapters").file(self.path.parent), factor))
@@ -325,28 +325,28 @@ class _Reader(LinedFile):
                 self.fail(one.line, str(error))
         return tuple(result)
 
-    def goals(self, given: dict[str, Lined]) -> tuple[Lined, ...]:
-        if "goal" in given:
-            return (given["goal"],)
-        if "goals" not in given:
+    def goals(self, entries: dict[str, Lined]) -> tuple[Lined, ...]:
+        if "goal" in entries:
+            return (entries["goal"],)
+        if "goals" not in entries:
             return ()
-        return tuple(self.items(given["goals"], "goals", of="goal"))
+        return tuple(self.items(entries["goals"], "goals", of="goal"))
 
     def transitions(self, rows: list[_Row], shared: float | None) -> list[float]:
-        """Each segment's transition to the next; what nobody asked for is shortened to what fits."""
+        """Each segment's transition to the next; one that is not requested is shortened to what fits."""
         result = []
         for row, following in zip(rows, [*rows[1:], None], strict=True):
-            asked = shared if row.transition is None and following else row.transition
+            length = shared if row.transition is None and following else row.transition
             following = following or row
             most = min(row.seconds, following.seconds) / 2
-            if asked is not None and asked > most + 1e-9:
+            if length is not None and length > most + 1e-9:
                 short = row if row.seconds <= following.seconds else following
                 self.fail(
                     row.transition_line or row.line,
-                    f"the transition takes {asked:g} s and the segment of {self.at(short.line)} {short.seconds:g} s; "
+                    f"the transition takes {length:g} s and the segment of {self.at(short.line)} {short.seconds:g} s; "
                     f"it may take at most half of that, {most:g} s",
                 )
-            result.append(min(TRANSITION, most) if asked is None else asked)
+            result.append(min(TRANSITION, most) if length is None else length)
         return result
 
     def segments(self, rows: list[_Row], transitions: list[float]) -> tuple[Segment, ...]:
@@ -371,63 +371,63 @@ class _Reader(LinedFile):
                 self.fail(other.line, str(error))
         return whole
 
-    def goal(self, found: Lined, name: str, frames: int) -> Goal:
+    def goal(self, node: Lined, name: str, frames: int) -> Goal:
         from motionloom.goals.goal_file import read_goal
 
-        what: Any = found.value
+        what: Any = node.value
         if isinstance(what, str):
-            what = self.file(found, name)
+            what = self.file(node, name)
         elif isinstance(what, dict):
             for key in ("points", "svg", "curve"):
                 if name == "path" and key in what:
                     self.fail(what[key].key_line, f"'path' holds a goal; write it as path: {{path: {{{key}: ...}}}}")
-            what = found.plain()
+            what = node.plain()
         else:
-            self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {self.got(found)}")
+            self.fail(node.line, f"'{name}' must be a mapping or the name of a goal file; got {self.kind(node)}")
         try:
             return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent, metre=self.metre)
         except MotionloomError as error:
-            self.fail(_line(found, str(error)), f"{name}: {error}")
+            self.fail(_line(node, str(error)), f"{name}: {error}")
 
-    def start(self, found: Lined | None) -> Path | None:
-        if found is None:
+    def start(self, node: Lined | None) -> Path | None:
+        if node is None:
             return None
         from motionloom.formats import readable
 
-        place = self.file(found, "start")
+        place = self.file(node, "start")
         if place.suffix.lower() not in readable():
-            self.fail(found.line, f"'start' must name a motion, one of {', '.join(readable())}; got {self.got(found)}")
+            self.fail(node.line, f"'start' must name a motion, one of {', '.join(readable())}; got {self.kind(node)}")
         return place
 
-    def file(self, found: Lined, name: str) -> Path:
+    def file(self, node: Lined, name: str) -> Path:
         """A file in the timeline's folder or below it; a timeline from an untrusted source reads nothing else."""
         try:
-            return Field(found.value, name).file(self.path.parent)
+            return Field(node.value, name).file(self.path.parent)
         except MotionloomError as error:
-            self.fail(found.line, str(error))
+            self.fail(node.line, str(error))
 
-    def text(self, found: Lined) -> str:
-        if not isinstance(found.value, str):
-            self.fail(found.line, f"the text must be words; got {self.got(found)} (put quotes around it if it is one)")
-        if problem := _text_problem(found.value):
-            self.fail(found.line, problem)
-        return found.value
+    def text(self, node: Lined) -> str:
+        if not isinstance(node.value, str):
+            self.fail(node.line, f"the text must be words; got {self.kind(node)} (put quotes around it if it is one)")
+        if problem := _text_problem(node.value):
+            self.fail(node.line, problem)
+        return node.value
 
-    def got(self, found: Lined) -> str:
-        return "an empty list" if found.value == [] else found.kind
+    def kind(self, node: Lined) -> str:
+        return "an empty list" if node.value == [] else node.kind
 
 
-def _line(found: Lined, message: str) -> int:
+def _line(node: Lined, message: str) -> int:
     """The line of what a message names as ``'joints[1].points[3].time'``; that of the whole where it names none."""
     named = re.match(r"'([\w.\[\]]+)' ", message)
-    line = found.key_line or found.line
+    line = node.key_line or node.line
     for step in re.findall(r"\w+", named[1]) if named else ():
-        inner = found.value
+        inner = node.value
         if isinstance(inner, dict) and step in inner:
-            found = inner[step]
+            node = inner[step]
         elif isinstance(inner, list) and step.isdecimal() and int(step) < len(inner):
-            found = inner[int(step)]
+            node = inner[int(step)]
         else:
             return line
-        line = found.key_line or found.line
+        line = node.key_line or node.line
     return line

@@ -74,8 +74,8 @@ def mood_of(clause: str) -> str:
 
 def verb_of(phrase: str, mood: str) -> str:
     """The verb that a phrase begins with, adverbs aside, as its base; empty if it is none of that mood."""
-    found = re.match(rf"\s*{_ADVERB}([A-Za-z]+)", phrase, re.IGNORECASE)
-    return MOODS[mood].get(found[1].lower(), "") if found and mood else ""
+    match = re.match(rf"\s*{_ADVERB}([A-Za-z]+)", phrase, re.IGNORECASE)
+    return MOODS[mood].get(match[1].lower(), "") if match and mood else ""
 
 
 def base_of(word: str) -> str:
@@ -88,8 +88,8 @@ def finite(phrase: str, mood: str = "third", *, of: str = "gerund") -> str:
     base = verb_of(phrase, of)
     if not base:
         return phrase
-    said = next(form for form, stem in MOODS[mood or "third"].items() if stem == base)
-    return re.sub(rf"^(\s*{_ADVERB})[A-Za-z]+", rf"\g<1>{said}", phrase, count=1, flags=re.IGNORECASE)
+    form = next(inflected for inflected, stem in MOODS[mood or "third"].items() if stem == base)
+    return re.sub(rf"^(\s*{_ADVERB})[A-Za-z]+", rf"\g<1>{form}", phrase, count=1, flags=re.IGNORECASE)
 
 
 def kind_of(item: str, mood: str) -> str:
@@ -98,10 +98,10 @@ def kind_of(item: str, mood: str) -> str:
     return kind_of_verb(verb_of(rest, mood), rest.lower())
 
 
-def kind_of_verb(word: str, said: str) -> str:
-    """The kind of action that a verb names in what is ``said``: sitting down is a change, sitting a state."""
+def kind_of_verb(word: str, phrase: str) -> str:
+    """The kind of action that a verb names in a ``phrase``: sitting down is a change, sitting a state."""
     base = base_of(word) or word
     changed = _TABLES["changed_by"].get(base)
-    if changed and re.search(changed[1], said):
+    if changed and re.search(changed[1], phrase):
         return changed[0]
     return _KINDS.get(base, "other")

@@ -55,7 +55,7 @@ def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
     if steer.facing is not None:
         turn = float(turn_between(steer.facing, course.place.facing))
         goal.facing[:] = course.place.facing + turn * smoothstep(np.arange(frames) / _turning(turn))
-        goal.facing_asked[at] = True
+        goal.facing_mask[at] = True
     return goal
 
 
@@ -72,7 +72,7 @@ def braking(course: Course, frames: int) -> Goal:
 def _ask(goal: Goal, at: NDArray[np.int_], way: Array) -> None:
     """Ask for the pelvis in some frames of a way (frames, 2)."""
     goal.positions[at, 0, ::2] = way[at]
-    goal.asked[at, 0, ::2] = True
+    goal.mask[at, 0, ::2] = True
 
 
 def _walked(course: Course, direction: float, step: float, frames: int) -> Array:
@@ -144,5 +144,5 @@ class Trail:
             gone = self._come(here, gone, 2 * pace + 0.1)
         goal, at = Goal.nothing(frames), np.arange(EVERY, frames, EVERY)
         _ask(goal, at, way)
-        goal.facing[:], goal.facing_asked[at] = facing, True  # a sharp turn has two ways round; this is the one
+        goal.facing[:], goal.facing_mask[at] = facing, True  # a sharp turn has two ways round; this is the one
         return goal, over

@@ -225,7 +225,7 @@ class Person(Asked):
         edits: list[Correction] = []
         turns: list[Correction] = []
         if not goal.empty:
-            edits.append(toward(goal.seen_from(course.place), self._prior, first=len(known), known=True))
+            edits.append(toward(goal.relative_to(course.place), self._prior, first=len(known), known=True))
         if self._trail is None and self._steer.speed is None and self._steer.direction is not None:
             turns.append(heading_for(self._steer.direction - course.place.facing, self._prior, first=len(known)))
         return Request(known, words, edits, turns, again, taken)
@@ -272,11 +272,11 @@ class Person(Asked):
         if isinstance(command, Reach):
             joint = SMPL22.index(command.joint)
             goal.positions[0, joint] = command.position
-            goal.asked[0, joint] = True
+            goal.mask[0, joint] = True
             return goal
         places = np.array(command.places)
         goal.positions[0] = there.to_world(places - places[:1] * [1, 0, 1])
-        goal.asked[0] = True
+        goal.mask[0] = True
         return goal
 
     def _place_in(self, frame: int, course: Course) -> GroundPose:

@@ -120,7 +120,7 @@ class _Reader(LinedFile):
         said = value.plain()
         fields = {"text": said} if kinds[0] == "say" else {} if said is None else said
         if not isinstance(fields, dict):
-            self.fail(value.line, f"'{kinds[0]}' must be a mapping; got {self.got(value)}")
+            self.fail(value.line, f"'{kinds[0]}' must be a mapping; got {self.kind(value)}")
         whom = person_of({"person": self.field(parts, keys, "person")})
         try:
             command = from_json({**fields, "type": kinds[0]})

@@ -16,7 +16,7 @@ from motionloom.features import humanml
 from motionloom.live.settings import Settings
 from motionloom.requests.sampling import Sampling
 from motionloom.runtime.prior_condition import Bound
-from motionloom.tasks.long import lengthened
+from motionloom.tasks.long import zero_padded
 from motionloom.tasks.sampling import Batch, Observed, Rows, sample
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
@@ -76,7 +76,7 @@ class Sampler:
         nowhere.
         """
         prior, count, length = self.prior, len(known), len(known) + frames
-        given = lengthened(known, length)[None]
+        given = zero_padded(known, length)[None]
         mask = np.zeros(given.shape, np.bool_)
         mask[:, :count] = True
         change = leaving(prior, known, frames, edits=edits, turns=turns)
@@ -129,7 +129,7 @@ class Sampler:
         def denoise(state: np.ndarray, level: int) -> np.ndarray:
             if level != last or ways == 1:
                 return guided(state, level) if level in early else late(state, level)
-            rows = shifted(np.concatenate([lengthened(state[:, k:], frames) for k in range(ways)]), level)
+            rows = shifted(np.concatenate([zero_padded(state[:, k:], frames) for k in range(ways)]), level)
             total = np.zeros_like(state)
             for k, row in enumerate(rows):
                 total[:, k:] += row[: frames - k]
@@ -147,7 +147,7 @@ def leaving(
 
     known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
     """
-    spread, given = prior.spread, lengthened(known, len(known) + frames)[None]
+    spread, given = prior.spread, zero_padded(known, len(known) + frames)[None]
     mask = np.zeros(given.shape, np.bool_)
     mask[:, : len(known)] = True
     meet = joining(given, mask, len(known), len(known) + frames)

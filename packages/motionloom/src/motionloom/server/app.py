@@ -21,7 +21,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
 from motionloom.requests.export import FORMATS, Export
 from motionloom.requests.fields import specs
-from motionloom.requests.reading import read, typed
+from motionloom.requests.reading import parse_fields, read
 from motionloom.retarget.named import NAMED
 from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
@@ -228,7 +228,7 @@ async def motion(request: Request) -> Response:
     if kind not in FORMATS:
         raise Refusal(404, f"motions are given as {', '.join(FORMATS)}; got {kind[:20]!r}")
     known = {key: value for key, value in request.query_params.items() if key in specs(Export)}
-    asked = read(Export, typed(Export, known) | {"motion": name, "format": kind}, "a file")
+    asked = read(Export, parse_fields(Export, known) | {"motion": name, "format": kind}, "a file")
     part = await _with_file(studio, lambda: files.export(studio.project, asked))
     return file_once(part, media_type=files.FORMATS[kind], name=f"motion-{name[:8]}{part.suffix}")
 

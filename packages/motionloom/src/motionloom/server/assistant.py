@@ -19,7 +19,7 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import Applied
 from motionloom.requests.export import Export
 from motionloom.requests.fields import Spec, specs
-from motionloom.requests.reading import narrowed, read
+from motionloom.requests.reading import narrow_fields, read
 from motionloom.requests.schema import Schema, schema
 from motionloom.requests.tasks import REQUESTS
 from motionloom.requests.timeline import SegmentKeys, TimelineKeys
@@ -79,7 +79,7 @@ class Assistant:
         async def call(**given: Any) -> Any:
             return await self._results({"task": task} | given)
 
-        known = narrowed(REQUESTS[task], most(task, self.worker.limits))
+        known = narrow_fields(REQUESTS[task], most(task, self.worker.limits))
         call.__name__ = "generate_motion" if task == "generate" else task
         call.__doc__ = f"{inspect.getdoc(REQUESTS[task])} Answers what happened in each motion, and shows it."
         call.__signature__ = _signature(known, list[dict[str, Any]])  # type: ignore[attr-defined]

@@ -14,7 +14,7 @@ import yaml
 
 from motionloom.requests.export import FORMATS, OnSkeleton
 from motionloom.requests.fields import specs
-from motionloom.requests.reading import narrowed
+from motionloom.requests.reading import narrow_fields
 from motionloom.requests.schema import Schema, schema
 from motionloom.requests.tasks import REQUESTS
 from motionloom.requests.timeline import SegmentKeys, TimelineKeys
@@ -78,7 +78,7 @@ def _requests(limits: Limits) -> dict[str, Schema]:
     for request in (*REQUESTS.values(), OnSkeleton):
         found |= {name.title(): {"enum": list(spec.words)} for name, spec in specs(request).items() if spec.words}
     for task, request in REQUESTS.items():
-        fields = narrowed(request, most(task, limits))
+        fields = narrow_fields(request, most(task, limits))
         keys = {"task": {"const": task}, "levels": _levels(limits)}
         keys |= {name: ref(name.title()) if spec.words else schema(spec, KINDS) for name, spec in fields.items()}
         needed = [name for name, spec in fields.items() if spec.needed]

@@ -66,7 +66,7 @@ def plan_of(request: JobRequest) -> Plan:
         people=tuple(people),
         target=target,
         taught=request.taught,
-        kept=request.kept,
+        previous=request.kept,
     )
 
 
@@ -80,7 +80,7 @@ def batch_key(request: JobRequest) -> tuple[Any, ...] | None:
 
 def at_once(request: JobRequest) -> bool:
     """Whether the motions of a request are drawn in the same network calls, rather than one after the other."""
-    return request.call is None and tasks.at_once(request)
+    return request.call is None and tasks.is_batched(request)
 
 
 def draw_together(models: Models, requests: Sequence[JobRequest], progress: Progress) -> Iterator[tuple[int, Result]]:
@@ -103,11 +103,11 @@ def measured(motion: Motion, parts: Iterable[tuple[str, Goal]]) -> dict[str, Any
     """How far a motion is from each part of its goal: mean and worst in centimetres, and when it is worst."""
     positions, found = None, {}
     for name, goal in parts:
-        asked = goal.asked.any(axis=-1)
+        asked = goal.mask.any(axis=-1)
         if not asked.any() or len(goal) != len(motion):
             continue
         positions = motion.positions() if positions is None else positions
-        away = np.linalg.norm(np.where(goal.asked, positions - goal.positions, 0.0), axis=-1)
+        away = np.linalg.norm(np.where(goal.mask, positions - goal.positions, 0.0), axis=-1)
         worst = int(away.max(axis=1).argmax())
         found[name] = {
             "mean_cm": round(100 * float(away[asked].mean()), 2),

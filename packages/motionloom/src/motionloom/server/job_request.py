@@ -13,7 +13,7 @@ from motionloom.goals.adapters import Applied, parse_adapter
 from motionloom.goals.fields import Field
 from motionloom.goals.timeline import Timeline, timeline_of
 from motionloom.requests.fields import Spec, specs
-from motionloom.requests.reading import read, settled
+from motionloom.requests.reading import read, resolve_sampling
 from motionloom.requests.tasks import REQUESTS
 from motionloom.requests.timeline import SECONDS
 from motionloom.server.limits import Limits
@@ -148,7 +148,7 @@ class _Reader:
 
     def compose(self, found: JobRequest) -> JobRequest:
         timeline = timeline_from_json(self.given["timeline"], self.project, self.limits)
-        found = replace(found, sampling=settled(found.values, timeline, but=self.given))
+        found = replace(found, sampling=resolve_sampling(found.values, timeline, but=self.given))
         parts = () if timeline.path is None else (("path", timeline.path),)
         return replace(
             found, timeline=timeline, goal=timeline.path, parts=parts, kept=self.kept_blocks(timeline, found)
@@ -196,7 +196,7 @@ class _Reader:
             found = self.compose(found)
             assert found.timeline is not None
             return replace(found, other_goal=self.other_goal(found.timeline.frames))
-        found = replace(found, sampling=settled(values))
+        found = replace(found, sampling=resolve_sampling(values))
         if kinds == ["react_to"]:
             if values.seconds is not None:
                 raise MotionloomError("an answer is as long as the motion it answers; leave out 'seconds'")
@@ -284,5 +284,5 @@ class _Reader:
             items = value.get(key) or []
             for number, item in enumerate([items] if isinstance(items, Mapping) else items):
                 own = read_goal({**base, key: [item]}, frames=frames, folder=folder)
-                found.append((f"{key}[{number}]", replace(own, asked=own.asked & ~path.asked)))
+                found.append((f"{key}[{number}]", replace(own, mask=own.mask & ~path.mask)))
         return tuple(found)

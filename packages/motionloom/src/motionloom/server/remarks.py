@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from motionloom.goals.remarks import Remark, numbers_read, parts_read, remarks_on, remarks_on_two
 from motionloom.server.job_request import JobRequest
-from motionloom.tasks.laid import only_head
+from motionloom.tasks.direct_edits import is_only_head_free
 
 if TYPE_CHECKING:
     from motionloom.tasks.run import Models
@@ -23,7 +23,7 @@ def remarks_of(models: "Models", request: JobRequest) -> list[Remark]:
     timeline, prior = request.timeline, models.prior
     texts = [request.prompt] if timeline is None else [segment.text for segment in timeline.segments]
     texts = list(dict.fromkeys(texts))[:MOST]
-    if request.task == "edit" and only_head(request.values.keep):
+    if request.task == "edit" and is_only_head_free(request.values.keep):
         return []
     if request.task == "duet":
         return remarks_on_two(texts, models.block.known, prior.known, prior.text)

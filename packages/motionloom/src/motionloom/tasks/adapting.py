@@ -1,4 +1,4 @@
-"""What was taught from clips, put into a prior: adapters by file and factor, for the whole or segment by segment."""
+"""Adapters trained on clips, merged into a prior by file and factor, for the whole or segment by segment."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from motionloom.goals.adapters import MOST_ADAPTERS, Applied
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
 
-KEPT = 4
-"""Different sets of adapters whose merged networks are kept; each is as large as the prior's network."""
+CACHE_SIZE = 4
+"""Sets of adapters whose merged networks are cached; each is as large as the prior's network."""
 
 
 def adapt(prior: Prior, adapters: Sequence[Applied]) -> Prior:
@@ -21,28 +21,28 @@ def adapt(prior: Prior, adapters: Sequence[Applied]) -> Prior:
     """
     if len(adapters) > MOST_ADAPTERS:
         raise MotionloomError(f"{len(adapters)} adapters at once are too many; at most {MOST_ADAPTERS}")
-    return prior.with_adapters(loaded(prior, adapters))
+    return prior.with_adapters(load_adapters(prior, adapters))
 
 
-def loaded(prior: Prior, adapters: Sequence[Applied]) -> tuple[tuple[Adapter, float], ...]:
+def load_adapters(prior: Prior, adapters: Sequence[Applied]) -> tuple[tuple[Adapter, float], ...]:
     """The same with every file read; errors as of `adapt`."""
     return tuple((Adapter.load(one, prior) if isinstance(one, Path) else one, factor) for one, factor in adapters)
 
 
 @dataclass(eq=False)
 class AdaptedPriors:
-    """A prior with different adapters at different times; the last `KEPT` merged ones are kept."""
+    """A prior with different adapters at different times; the last `CACHE_SIZE` merged ones are cached."""
 
     prior: Prior
-    made: OrderedDict[tuple[Applied, ...], Prior] = field(default_factory=OrderedDict)
+    cache: OrderedDict[tuple[Applied, ...], Prior] = field(default_factory=OrderedDict)
 
     def of(self, adapters: tuple[Applied, ...]) -> Prior:
         """The prior with these adapters besides those it has; errors as of `adapt`."""
         if not adapters:
             return self.prior
-        if adapters not in self.made:
-            self.made[adapters] = adapt(self.prior, adapters)
-            while len(self.made) > KEPT:
-                self.made.popitem(last=False)
-        self.made.move_to_end(adapters)
-        return self.made[adapters]
+        if adapters not in self.cache:
+            self.cache[adapters] = adapt(self.prior, adapters)
+            while len(self.cache) > CACHE_SIZE:
+                self.cache.popitem(last=False)
+        self.cache.move_to_end(adapters)
+        return self.cache[adapters]

@@ -18,55 +18,60 @@ from motionloom.goals.expected import asks_for_rest, share_met
 from motionloom.kinematics.wholeness import ENOUGH, wholeness
 from motionloom.weights.prior import Prior
 
-STILLER = 0.8
-"""Share of the middle candidate's pace below which another one counts as one that stands."""
+STILL_SHARE = 0.8
+"""Share of the middle candidate's pace below which another one counts as standing still."""
 Rank = tuple[float, ...]
 """The smaller the better."""
 
 
-def seeds_tried(seed: int, count: int) -> list[int]:
+def candidate_seeds(seed: int, count: int) -> list[int]:
     """The seeds among which one is chosen: the motion's own, and others that depend on it alone."""
     return [seed, *(row_seed(seed, number) for number in range(1, count))]
 
 
-def best(prior: Prior, prompts: Sequence[str], states: np.ndarray, *, seeds: Sequence[int], level: int) -> int:
-    """Which of several candidates is kept.
+def best_candidate(
+    prior: Prior, prompts: Sequence[str], states: np.ndarray, *, seeds: Sequence[int], level: int
+) -> int:
+    """The index of the best of several candidates.
 
     prompts: of each person. states: (candidates, people, frames, features) half-way estimates, standardised. seeds: of
     the candidates. level: the highest of the walk.
     """
     people = [_ranks(prior, prompt, states[:, i], seeds, level) for i, prompt in enumerate(prompts)]
-    return smallest([tuple(map(sum, zip(*one, strict=True))) for one in zip(*people, strict=True)])
+    return index_of_smallest([tuple(map(sum, zip(*one, strict=True))) for one in zip(*people, strict=True)])
 
 
-def smallest(ranks: Sequence[Rank]) -> int:
+def index_of_smallest(ranks: Sequence[Rank]) -> int:
     """The place of the best of them."""
     return ranks.index(min(ranks))
 
 
 def _ranks(prior: Prior, prompt: str, states: np.ndarray, seeds: Sequence[int], level: int) -> list[Rank]:
-    mean = _mean(prior, prompt, states.shape[1], seeds, level)
+    mean = _mean_estimate(prior, prompt, states.shape[1], seeds, level)
     return [
-        (*before, _distance(one, mean)) for before, one in zip(_looked_at(prior, prompt, states), states, strict=True)
+        (*before, _distance(one, mean))
+        for before, one in zip(_candidate_ranks(prior, prompt, states), states, strict=True)
     ]
 
 
-def _looked_at(prior: Prior, prompt: str, estimates: np.ndarray) -> list[Rank]:
+def _candidate_ranks(prior: Prior, prompt: str, estimates: np.ndarray) -> list[Rank]:
     """Of each estimate (rows, frames, features) what comes before the mean."""
     if len(prior.mean) != WIDTH:
         return [()] * len(estimates)
     bodies = humanml.decode_positions(prior.to_features(estimates))
-    return [(-share_met(prompt, body, prior.fps), *rank) for body, rank in zip(bodies, alive(bodies, prompt))]
+    return [
+        (-share_met(prompt, body, prior.fps), *rank) for body, rank in zip(bodies, liveliness_ranks(bodies, prompt))
+    ]
 
 
-def alive(bodies: np.ndarray, prompt: str = "") -> list[Rank]:
+def liveliness_ranks(bodies: np.ndarray, prompt: str = "") -> list[Rank]:
     """Of each motion (rows, frames, 22, 3) whether its body is not whole, and whether it moves less than the others."""
     pace = np.linalg.norm(np.diff(bodies, axis=1), axis=-1).mean(axis=(1, 2))
-    still = np.zeros(len(pace)) if asks_for_rest(prompt) else pace < STILLER * np.median(pace)
+    still = np.zeros(len(pace)) if asks_for_rest(prompt) else pace < STILL_SHARE * np.median(pace)
     return [(float(wholeness(body) < ENOUGH), float(slow)) for body, slow in zip(bodies, still, strict=True)]
 
 
-def _mean(prior: Prior, prompt: str, length: int, seeds: Sequence[int], level: int) -> np.ndarray:
+def _mean_estimate(prior: Prior, prompt: str, length: int, seeds: Sequence[int], level: int) -> np.ndarray:
     """(length, features) standardised: the network's answer to pure noise, averaged over the noise of the seeds."""
     noise = row_noise(seeds)(np.empty((len(seeds), length, len(prior.mean)), np.float32))
     return prior.net(noise, level, prior.net.bind(prior.condition([prompt] * len(seeds)))).mean(0)

@@ -38,7 +38,7 @@ class Places:
     contacts: Array
     """(frames, 4) as in the features."""
     goal: Goal
-    """What is asked of these frames, in the world; empty where nothing is."""
+    """Targets of these frames, in the world; empty where there are none."""
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -53,16 +53,18 @@ def solve_stream(pieces: Iterable[Places], fps: float, *, foot_lock: bool = True
     waiting: Places | None = None
     before, tail = 0, None
     for piece in pieces:
-        waiting = piece if waiting is None else strung(waiting, piece)
+        waiting = piece if waiting is None else join_places(waiting, piece)
         while len(waiting) >= before + BLOCK + MARGIN:
-            made = _as(tail, solve(waiting.crop(0, before + BLOCK + MARGIN), fps, foot_lock=foot_lock), before)
-            yield _faded(tail, made.frames(before, before + BLOCK))
-            tail = made.frames(before + BLOCK, before + BLOCK + FADE)
+            solved = _with_signs_of(
+                tail, solve(waiting.crop(0, before + BLOCK + MARGIN), fps, foot_lock=foot_lock), before
+            )
+            yield _crossfaded(tail, solved.frames(before, before + BLOCK))
+            tail = solved.frames(before + BLOCK, before + BLOCK + FADE)
             waiting = waiting.crop(before + BLOCK - MARGIN, len(waiting))
             before = MARGIN
     if waiting is not None and len(waiting) > before:
-        made = _as(tail, solve(waiting, fps, foot_lock=foot_lock), before)
-        yield _faded(tail, made.frames(before, len(waiting)))
+        solved = _with_signs_of(tail, solve(waiting, fps, foot_lock=foot_lock), before)
+        yield _crossfaded(tail, solved.frames(before, len(waiting)))
 
 
 def solve(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
@@ -73,7 +75,7 @@ def solve(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
     return motion if places.goal.empty else fit(motion, places.goal)
 
 
-def strung(first: Places, second: Places) -> Places:
+def join_places(first: Places, second: Places) -> Places:
     """The second behind the first."""
     return Places(
         np.concatenate([first.positions, second.positions]),
@@ -82,7 +84,7 @@ def strung(first: Places, second: Places) -> Places:
     )
 
 
-def _as(old: Motion | None, new: Motion, at: int) -> Motion:
+def _with_signs_of(old: Motion | None, new: Motion, at: int) -> Motion:
     """The new motion with the signs of quaternions that ``old`` begins with at frame ``at``; both signs are one turn.
 
     Of the whole, not of what is handed out: the next block takes its signs from the frames behind.
@@ -93,7 +95,7 @@ def _as(old: Motion | None, new: Motion, at: int) -> Motion:
     return replace(new, rotations=np.where(other[:, None], -new.rotations, new.rotations))
 
 
-def _faded(old: Motion | None, new: Motion) -> Motion:
+def _crossfaded(old: Motion | None, new: Motion) -> Motion:
     """The new block, begun as the frames ``old`` that the block before it saw in its place."""
     if old is None:
         return new

@@ -19,7 +19,7 @@ from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, Place, bone_lengths, with_bones
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
-from motionloom.tasks.best import alive, seeds_tried, smallest
+from motionloom.tasks.best import candidate_seeds, index_of_smallest, liveliness_ranks
 from motionloom.tasks.watching import View
 from motionloom.weights.predictor import Predictor
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 STEPS, SOLVER, SPACING = PredictionSampling.steps, PredictionSampling.solver, PredictionSampling.spacing
 FUTURES = 10
-"""Futures that are made unless asked otherwise."""
+"""Futures unless ``count`` is set."""
 EASE = 0.4
 """Seconds over which unknown frames go over from what is known to the network's own course."""
 BATCH = 512
@@ -41,7 +41,7 @@ class Known:
     positions: Array
     """(frames, joints, 3) or (rows, frames, joints, 3) metres in the world; read where ``mask`` is above 0."""
     mask: NDArray[np.float32]
-    """(frames, parts) 1 where a joint is given, see `Layout.part`; numbers between mix."""
+    """(frames, parts) 1 where a joint is known, see `Layout.part`; numbers between mix."""
 
 
 def complete(
@@ -58,7 +58,7 @@ def complete(
     """Windows (rows, frames, channels) with what is not known sampled; row i from ``seeds[i]``, alone or in a batch.
 
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
-    observed one. Known numbers are those that are given, and the others leave them without a jump. ``sampling``, or
+    observed one. Known numbers are returned as they are, and the others leave them without a jump. ``sampling``, or
     single settings of it as keywords: a guidance above 1 exaggerates the condition, below 1 heeds it less; it needs a
     second pass. ``poses``: such windows as (rows, people, frames, 22, 3) metres, for who is `watching`; None: nobody
     can.
@@ -68,16 +68,16 @@ def complete(
     way = chosen.levels(predictor.schedule)
     if chosen.best_of > 1:
         seeds = _best_seeds(predictor, condition, pose, seeds=seeds, sampling=chosen, way=way)
-    made, walk = _walk(predictor, condition, seeds, chosen, way)
+    state, walk = _start_sampling(predictor, condition, seeds, chosen, way)
     if poses is not None:
         view = View(lambda states: poses(predictor.to_features(states, pose)))
-        walk = view.reported(walk, len(way) - 1, range(len(condition)))
+        walk = view.report_walk(walk, len(way) - 1, range(len(condition)))
     for snapshot in walk:
-        made = snapshot.state
-    return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
+        state = snapshot.state
+    return join_known(predictor.to_features(state, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
 
 
-def _walk(
+def _start_sampling(
     predictor: Predictor,
     condition: np.ndarray,
     seeds: Sequence[int],
@@ -88,10 +88,10 @@ def _walk(
     noise = row_noise(seeds)
     state = sampling.temperature * noise(np.empty((len(condition), *predictor.mean.shape), np.float32))
     how = {"solver": SOLVERS[sampling.solver], "schedule": predictor.schedule, "noise": noise}
-    return state, sample(_guided(predictor, condition, sampling.guidance), state, levels=way, **how)
+    return state, sample(_guided_denoiser(predictor, condition, sampling.guidance), state, levels=way, **how)
 
 
-def _guided(predictor: Predictor, condition: np.ndarray, guidance: float) -> Denoiser:
+def _guided_denoiser(predictor: Predictor, condition: np.ndarray, guidance: float) -> Denoiser:
     yes, no = (np.full(len(condition), flag) for flag in (True, False))
 
     def net(x: np.ndarray, level: int, cond: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -111,9 +111,11 @@ def _best_seeds(
 ) -> list[int]:
     """For each window the best of several seeds: half way whole, moving, and then nearest to the mean of them all."""
     count = sampling.best_of
-    tried = [seeds_tried(seed, count) for seed in seeds]
+    tried = [candidate_seeds(seed, count) for seed in seeds]
     several = [seed for one in tried for seed in one]
-    state, walk = _walk(predictor, condition.repeat(count, axis=0), several, sampling, way[: len(way) // 2 + 1])
+    state, walk = _start_sampling(
+        predictor, condition.repeat(count, axis=0), several, sampling, way[: len(way) // 2 + 1]
+    )
     for snapshot in walk:
         state = snapshot.clean
     features, layout = predictor.to_features(state, pose.repeat(count, axis=0)), predictor.layout
@@ -121,32 +123,34 @@ def _best_seeds(
     for own, candidates in zip(features.reshape(len(seeds), count, *features.shape[1:]), tried, strict=True):
         away = ((own - own.mean(axis=0)) ** 2).mean(axis=(1, 2))
         person = layout.names == SMPL_LAYOUT.names
-        before = alive(layout.decode(own, Place(np.zeros(3), np.zeros(())))) if person else [()] * count
-        chosen.append(candidates[smallest([(*rank, float(far)) for rank, far in zip(before, away, strict=True)])])
+        before = liveliness_ranks(layout.decode(own, Place(np.zeros(3), np.zeros(())))) if person else [()] * count
+        chosen.append(
+            candidates[index_of_smallest([(*rank, float(far)) for rank, far in zip(before, away, strict=True)])]
+        )
     return chosen
 
 
-def joined(made: np.ndarray, known: np.ndarray, mask: np.ndarray, *, ease: int) -> np.ndarray:
-    """``known`` where ``mask`` is 1, ``made`` matched to it elsewhere: (rows, frames, channels), mask one per 3 of
+def join_known(sampled: np.ndarray, known: np.ndarray, mask: np.ndarray, *, ease: int) -> np.ndarray:
+    """``known`` where ``mask`` is 1, else ``sampled`` matched to it: (rows, frames, channels), mask one per 3 of
     them.
 
-    What made frames lack at a border, in value and in change per frame, fades over ``ease`` frames as the quintic that
+    What ``sampled`` lacks at a border, in value and in change per frame, fades over ``ease`` frames as the quintic that
     leaves their second derivative alone, or over the whole gap between two borders where that is shorter. Rows whose
     masks are equal are done at once.
     """
-    each = mask.astype(made.dtype).repeat(3, axis=-1)
-    result = (1 - each) * made + each * known
+    each = mask.astype(sampled.dtype).repeat(3, axis=-1)
+    result = (1 - each) * sampled + each * known
     sure = mask >= 1
     patterns, rows = np.unique(sure.reshape(len(sure), -1), axis=0, return_inverse=True)
     for number, pattern in enumerate(patterns.reshape(-1, *sure.shape[1:])):
         chosen = np.flatnonzero(rows.reshape(-1) == number)
-        result[chosen] += _matching(made[chosen], known[chosen], pattern, ease) * (1 - each[chosen])
+        result[chosen] += _matching(sampled[chosen], known[chosen], pattern, ease) * (1 - each[chosen])
     return result
 
 
-def _matching(made: np.ndarray, known: np.ndarray, sure: NDArray[np.bool_], ease: int) -> np.ndarray:
-    """What to add to ``made`` (rows, frames, channels) for one mask (frames, parts)."""
-    added, lack = np.zeros_like(made), known - made
+def _matching(sampled: np.ndarray, known: np.ndarray, sure: NDArray[np.bool_], ease: int) -> np.ndarray:
+    """What to add to ``sampled`` (rows, frames, channels) for one mask (frames, parts)."""
+    added, lack = np.zeros_like(sampled), known - sampled
     courses, parts = np.unique(sure.T, axis=0, return_inverse=True)
     for number, course in enumerate(courses):
         joints = np.flatnonzero(parts.reshape(-1) == number)
@@ -192,19 +196,22 @@ def next_frames(
     _check(predictor, past, frames, known)
     rows, h = past.shape[:2]
     layout, place = predictor.layout, predictor.layout.place(past[:, -1])
-    seen = np.zeros((rows, predictor.frames, layout.channels))
+    observed = np.zeros((rows, predictor.frames, layout.channels))
     mask = np.zeros((predictor.frames, layout.parts), dtype=np.float32)
-    seen[:, :h], mask[:h] = layout.encode(past, place), 1
+    observed[:, :h], mask[:h] = layout.encode(past, place), 1
     if known is not None:
-        given = np.broadcast_to(known.positions, (rows, *known.positions.shape[-3:]))
-        count = min(given.shape[1], predictor.frames - h)
-        seen[:, h : h + count], mask[h : h + count] = layout.encode(given[:, :count], place), known.mask[:count]
-    features, masks = seen.astype(np.float32), np.broadcast_to(mask, (rows, *mask.shape))
+        positions = np.broadcast_to(known.positions, (rows, *known.positions.shape[-3:]))
+        count = min(positions.shape[1], predictor.frames - h)
+        observed[:, h : h + count], mask[h : h + count] = (
+            layout.encode(positions[:, :count], place),
+            known.mask[:count],
+        )
+    features, masks = observed.astype(np.float32), np.broadcast_to(mask, (rows, *mask.shape))
 
     def placed(windows: np.ndarray) -> Array:
         return layout.decode(windows[:, h : h + frames], place)
 
-    made = complete(
+    completed = complete(
         predictor,
         features,
         masks,
@@ -213,7 +220,7 @@ def next_frames(
         sampling=PredictionSampling.of(sampling, settings),
         poses=lambda windows: placed(windows)[:, None],
     )
-    places = placed(made)
+    places = placed(completed)
     return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
 
 
@@ -231,15 +238,15 @@ def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) 
         )
     if known is None:
         return
-    given, mask = known.positions.shape, known.mask.shape
+    shape, mask = known.positions.shape, known.mask.shape
     if (
         mask[1:] != (layout.parts,)
-        or given[-3:] != (*mask[:1], layout.joints, 3)
-        or given[:-3] not in ((), (len(past),))
+        or shape[-3:] != (*mask[:1], layout.joints, 3)
+        or shape[:-3] not in ((), (len(past),))
     ):
         raise MotionloomError(
             f"what is known to this predictor are places (frames, {layout.joints}, 3) and a mask (frames, "
-            f"{layout.parts}); got {given} and {mask}"
+            f"{layout.parts}); got {shape} and {mask}"
         )
 
 
@@ -255,7 +262,7 @@ def futures(
     """(windows, count, frames, joints, 3): futures of each past (windows, h, joints, 3); see `next_frames`.
 
     sampling, or single settings of it as keywords: ``count`` futures of each past; future i is sampled from
-    ``row_seed(seed, i)`` whatever else is asked.
+    ``row_seed(seed, i)`` whatever the other arguments are.
     """
     chosen, many = PredictionSampling.of(sampling, settings), np.asarray(past)
     count, rows = chosen.number(FUTURES), chosen.batch(BATCH)
@@ -275,5 +282,5 @@ def futures(
         )
         for first in range(0, len(many), rows)
     ]
-    made = np.concatenate(parts)
-    return made.reshape(len(past), count, *made.shape[1:])
+    sampled = np.concatenate(parts)
+    return sampled.reshape(len(past), count, *sampled.shape[1:])

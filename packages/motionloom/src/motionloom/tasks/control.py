@@ -20,12 +20,11 @@ from motionloom.features.layout import ric
 from motionloom.goals.goal import Goal, start_of
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
-from motionloom.requests.shared import LONGEST
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.sampling import Batch, Progress, Rows, sample
-from motionloom.tasks.text import alone, check_prompts, to_motion
+from motionloom.tasks.text import check_goal_length, check_prompts, single_person_view, to_motion
 from motionloom.weights.adapter import Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
@@ -36,19 +35,19 @@ Adapters = Literal["none", "fitting"] | Sequence[Adapter | Weighted]
 MISSED = 0.05
 """Metres off beyond which a target counts as missed."""
 SENTENCES = 10
-"""Missed targets that are put into words."""
+"""Missed targets that are reported, at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class Controlled:
-    """A motion made for a goal, and how well it meets it."""
+    """A motion for a goal, and how well it meets it."""
 
     motion: Motion
     """In the world of the goal."""
     sampled: Motion
     """The same before it was fitted."""
     error: float
-    """Metres: mean over the joints and frames that are asked for a place."""
+    """Metres: mean over the joints and frames with a target."""
     worst: float
     """Metres: the largest of them."""
     missed: tuple[str, ...]
@@ -67,13 +66,13 @@ def control(
     progress: Progress | None = None,
     **settings: Unpack[Settings],
 ) -> list[Controlled]:
-    """Make motions of the goal's length that do what ``prompt`` says and what ``goal`` asks.
+    """Make motions of the goal's length that do what ``prompt`` says and meet ``goal``.
 
     Args:
         prior: weights that make HumanML3D's 263 numbers.
         prompt: what the person does.
-        goal: in the world, metres, at 20 frames per second; the person stands at its `start_of` in frame 0.
-        adapters: networks trained to see what is asked, each alone or with its weight (the mean of all by default);
+        goal: in the world, metres, at 20 frames per second; the person's ground pose in frame 0 is its `start_of`.
+        adapters: networks trained to see the targets, each alone or with its weight (the mean of all by default);
             "fitting" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own network: the shipped
             ones were measured to make no smaller errors but more jerk (docs/decisions/0012).
         fit: fit the sampled motion to the goal.
@@ -82,7 +81,7 @@ def control(
         progress: called after each network call with the calls done and the calls in all.
 
     Raises:
-        MotionloomError: for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
+        MotionloomError: for an impossible request; a goal out of reach is no error (see `Controlled.missed`).
     """
     chosen = Sampling.of(sampling, settings)
     seeds = chosen.seeds(chosen.number())
@@ -103,22 +102,20 @@ def control_each(
     progress: Progress | None = None,
 ) -> list[Controlled]:
     """`control` for motions of one goal, each of its own prompt and seed; arguments and errors as there."""
-    longest = round(LONGEST * prior.fps)
-    if not 4 <= len(goal) <= longest:
-        raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
+    check_goal_length(goal, prior.fps)
     place = start_of(goal)
     nets = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
-    made = steered_features(
+    features = steered_features(
         prior,
         prompts,
-        goal.seen_from(place),
+        goal.relative_to(place),
         seeds=seeds,
         adapters=nets,
         sampling=sampling,
         progress=progress,
     )
-    sampled = [to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock).placed(place) for row in made]
-    return [judged(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
+    sampled = [to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock).placed(place) for row in features]
+    return [evaluate(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
 
 
 def steered_features(
@@ -134,25 +131,25 @@ def steered_features(
 ) -> list[np.ndarray]:
     """`motionloom.tasks.text.sample_features` for rows of the goal's length, each estimate steered towards ``goal``.
 
-    ``goal`` as of `steering.toward`. With ``adapters`` their blended estimates are steered, and the numbers that are
-    asked are in the state without noise, as the last steered estimate has them (as in Shafir et al. 2024, algorithm 2,
-    whose numbers are known beforehand; here they depend on where the rest of the body goes).
+    ``goal`` as of `steering.toward`. With ``adapters`` their blended estimates are steered; the numbers with targets
+    are in the state without noise, as the last steered estimate has them (as in Shafir et al. 2024, algorithm 2, whose
+    numbers are known beforehand; here they depend on where the rest of the body goes).
     """
     check_prompts(prompts)
     pairs = [one if isinstance(one, tuple) else (one, 1 / len(adapters)) for one in adapters]
     nets, weights = [adapted(prior.net, adapter) for adapter, _ in pairs], [weight for _, weight in pairs]
     chosen, change = Sampling.of(sampling, settings), toward(goal, prior)
-    mask = controlled_numbers(goal)
+    mask = goal_feature_mask(goal)
 
     def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
         if not nets:
             return corrected(denoise, [change] * len(batch.rows))
         shown = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.guidance)
-        return _seeing(shown, change, prior, mask)
+        return _conditioned(shown, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
-    made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=alone(prior)))
-    return [prior.to_features(made[row]) for row in range(len(prompts))]
+    states = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=single_person_view(prior)))
+    return [prior.to_features(states[row]) for row in range(len(prompts))]
 
 
 def blended(
@@ -164,7 +161,7 @@ def blended(
     weights: Sequence[Weight],
     guidance: float,
 ) -> Denoiser:
-    """DiffusionBlending: networks guided by themselves, then their weighted sum; shown what is given if they can be."""
+    """DiffusionBlending: networks guided by themselves, then their weighted sum; conditioned where they can be."""
     null = cond.null()
     guided = [
         guide(net, show(net, net.bind(cond), known, mask), show(net, net.bind(null), known, mask), guidance)
@@ -173,18 +170,18 @@ def blended(
     return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 
-def controlled_numbers(goal: Goal) -> np.ndarray:
+def goal_feature_mask(goal: Goal) -> np.ndarray:
     """(frames, 263) bool: the numbers of the representation that a goal is about, frame by frame."""
     mask = np.zeros((len(goal), len(named("root"))), dtype=bool)
-    mask[goal.asked[:, 0].any(axis=-1)] |= named("root_horizontal")
-    mask[goal.asked[:, 0, 1], 3] = True
+    mask[goal.mask[:, 0].any(axis=-1)] |= named("root_horizontal")
+    mask[goal.mask[:, 0, 1], 3] = True
     for joint in range(1, len(SMPL22)):
-        mask[goal.asked[:, joint].any(axis=-1), ric(joint)] = True
+        mask[goal.mask[:, joint].any(axis=-1), ric(joint)] = True
     return mask
 
 
 def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
-    """The adapters beside the shipped weights for what is asked: one per joint that has its own, else ``any``.
+    """The adapters beside the shipped weights for a goal: one per joint that has its own, else ``any``.
 
     MotionloomError where there are none, for other weights than those they belong to, and for damaged files.
     """
@@ -194,21 +191,21 @@ def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
             "no adapters lie in weights/control of this installation: they come with the repository, not with the "
             "package; name adapter files, or control without them, which is as good"
         )
-    wanted = {("trajectory" if joint == "pelvis" else joint) for joint in goal.joints}
-    chosen = {name if name in names else "any" for name in wanted} & set(names)
+    requested = {("trajectory" if joint == "pelvis" else joint) for joint in goal.joints}
+    chosen = {name if name in names else "any" for name in requested} & set(names)
     return [Adapter.load(name, prior) for name in sorted(chosen)]
 
 
-def _seeing(
+def _conditioned(
     net: Callable[[np.ndarray, np.ndarray], Denoiser], change: Correction, prior: Prior, mask: np.ndarray
 ) -> Denoiser:
     """The steered denoiser that shows its networks the last steered estimate, free of noise, where ``mask`` is True.
 
-    ``net`` (given, mask) is the denoiser of the networks that are shown what is given. At the first level nothing is.
+    ``net`` (known, mask) is the denoiser of the networks that see the known numbers. At the first level none is known.
     """
     last: np.ndarray | None = None
 
-    def seen(state: np.ndarray, level: int) -> np.ndarray:
+    def denoise(state: np.ndarray, level: int) -> np.ndarray:
         nonlocal last
         if last is None:
             denoised = net(np.zeros_like(state), np.zeros(state.shape, np.bool_))(state, level)
@@ -218,15 +215,15 @@ def _seeing(
         last = np.stack([change(row, level) for row in denoised])
         return last
 
-    return seen
+    return denoise
 
 
-def judged(motion: Motion, sampled: Motion, goal: Goal) -> Controlled:
-    """How far ``motion`` is from what ``goal`` asks, joint by joint and frame by frame."""
-    off = np.where(goal.asked, motion.positions() - goal.positions, 0.0)
-    asked = goal.asked.any(axis=-1)
+def evaluate(motion: Motion, sampled: Motion, goal: Goal) -> Controlled:
+    """How far ``motion`` is from the targets of ``goal``, joint by joint and frame by frame."""
+    off = np.where(goal.mask, motion.positions() - goal.positions, 0.0)
+    has_target = goal.mask.any(axis=-1)
     distance = np.linalg.norm(off, axis=-1)
-    if not asked.any():
+    if not has_target.any():
         return Controlled(motion, sampled, 0.0, 0.0, ())
     order = np.argsort(-distance, axis=None)[:SENTENCES]
     worst = [np.unravel_index(k, distance.shape) for k in order]
@@ -235,4 +232,4 @@ def judged(motion: Motion, sampled: Motion, goal: Goal) -> Controlled:
         for frame, joint in worst
         if distance[frame, joint] > MISSED
     )
-    return Controlled(motion, sampled, float(distance[asked].mean()), float(distance.max()), missed)
+    return Controlled(motion, sampled, float(distance[has_target].mean()), float(distance.max()), missed)

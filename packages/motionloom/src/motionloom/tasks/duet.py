@@ -1,4 +1,4 @@
-"""Two people and what else there is: an answer to somebody's motion, and long duets of several prompts.
+"""Two people and what else there is: a second person for a motion, and long duets of several prompts.
 
 A long duet is a chain of rows as in `tasks.long`, each holding both people. Neighbouring rows agree on what each person
 does where they overlap; the relative pose of the two is sampled for the first row, and carried along by everybody's
@@ -32,7 +32,16 @@ from motionloom.requests.sampling import PairSampling, PairSettings
 from motionloom.runtime.pair import PLACE, PairSession, join, part, people
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.body import solve_stream
-from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, lengthened, same_net
+from motionloom.tasks.long import (
+    Row,
+    Track,
+    chain_rows,
+    group_by_net,
+    place_pieces,
+    segments_on,
+    stack_conditions,
+    zero_padded,
+)
 from motionloom.tasks.pair import (
     PairEdits,
     check_pair,
@@ -54,13 +63,13 @@ BATCH = 8
 """Rows of a long duet in one network call."""
 
 
-# Somebody is given
+# An answer to somebody's motion
 
 
 def react(
     prior: Prior,
     block: PairBlock,
-    given: Motion,
+    motion: Motion,
     prompt: str = "",
     *,
     foot_lock: bool = True,
@@ -68,33 +77,33 @@ def react(
     progress: Progress | None = None,
     **settings: Unpack[PairSettings],
 ) -> list[Duet]:
-    """Duets whose first person is ``given``, bit for bit, and whose second is sampled to go with it.
+    """Duets whose first person is ``motion``, bit for bit, and whose second is sampled to go with it.
 
     Args:
-        given: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The
+        motion: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The
             second is the 22-joint person, of as many frames at that rate, in the same world and on the same floor.
         prompt: as of `pair.generate_pair`; an empty one asks for nothing in particular.
         foot_lock: keep the second person's planted feet still.
         sampling, progress: as of `pair.generate_pair`.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
     """
-    said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
-    check_pair(prior, count=chosen.number(), seconds=given.seconds)
-    partner, net, count = Partner.of(given), block.net(prior), chosen.number()
+    prompts, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
+    check_pair(prior, count=chosen.number(), seconds=motion.seconds)
+    partner, net, count = Partner.of(motion), block.net(prior), chosen.number()
     known = partner.state(net, count)
     sampled = pair_features(
         prior,
         net,
-        said * count,
+        prompts * count,
         known.values.shape[1] - 1,
         seeds=pair_seeds(chosen),
-        edits=PairEdits(known, meetings=meetings_of(said, chosen)),
+        edits=PairEdits(known, meetings=meetings_of(prompts, chosen)),
         sampling=chosen,
         progress=progress,
     )
-    return [(given, partner.answer(prior, one, foot_lock=foot_lock)) for one in sampled.each()]
+    return [(motion, partner.answer(prior, one, foot_lock=foot_lock)) for one in sampled.each()]
 
 
 # Several prompts
@@ -126,7 +135,7 @@ def compose_pair(
         sampling, progress: as of `long.compose`, with `PairSampling`.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
 
     (Shafir et al. 2024, sections 3 and 4, in one loop; nothing published does both.)
     """
@@ -137,23 +146,23 @@ def compose_pair(
     if not segments:
         raise MotionloomError("there is no segment; say what the two people do, one after the other")
     tracks = [None if one is None else Track.along(one, prior.fps) for one in (path, other)][:: -1 if person else 1]
-    asked = [_asked(segments, i, tracks[i], person) for i in (0, 1)]
+    both = [_segments_of(segments, i, tracks[i], person) for i in (0, 1)]
     if other is not None and path is None:
         raise MotionloomError("a path of the other person goes with one of the first; give both")
-    both = np.stack([track.place(0).numbers() for track in tracks if track]) if other is not None else None
-    sampled = duet_features(prior, block.net(prior), asked, begin=both, sampling=chosen, progress=progress)
+    begin = np.stack([track.place(0).numbers() for track in tracks if track]) if other is not None else None
+    sampled = duet_features(prior, block.net(prior), both, begin=begin, sampling=chosen, progress=progress)
     first = next(sampled)
-    if both is not None:
-        first = PairMotion(first.features, both)
+    if begin is not None:
+        first = PairMotion(first.features, begin)
     elif track := tracks[person]:
         first = first.moved_to(track.place(0).numbers(), person)
     pieces = tee(chain([first], sampled))
     people = [
         solve_stream(
-            in_world(
+            place_pieces(
                 prior,
-                _of(pieces[i], i),
-                deque(segment.goal for segment in asked[i]),
+                _features_of_person(pieces[i], i),
+                deque(segment.goal for segment in both[i]),
                 GroundPose.of_numbers(first.poses[i]),
                 tracks[i],
             ),
@@ -165,18 +174,16 @@ def compose_pair(
     yield from zip(*people, strict=True)
 
 
-def _asked(segments: Sequence[Segment], person: int, track: Track | None, goals_of: int) -> list[Segment]:
+def _segments_of(segments: Sequence[Segment], person: int, track: Track | None, goals_of: int) -> list[Segment]:
     """The segments of one person; on a path each has its part among its targets."""
-    result, first = [], 0
-    for segment in segments:
-        own = replace(segment, text=prompts_of(segment.text)[person], goal=segment.goal if person == goals_of else None)
-        frames = round(own.seconds * FPS)
-        result.append(track.asked(own, first, frames) if track else own)
-        first += frames
-    return result
+    own = (
+        replace(one, text=prompts_of(one.text)[person], goal=one.goal if person == goals_of else None)
+        for one in segments
+    )
+    return list(segments_on(track, own, FPS))
 
 
-def _of(pieces: Iterable[PairMotion], person: int) -> Iterator[np.ndarray]:
+def _features_of_person(pieces: Iterable[PairMotion], person: int) -> Iterator[np.ndarray]:
     return (piece.features[person] for piece in pieces)
 
 
@@ -201,7 +208,7 @@ def duet_features(
     denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance, chosen.bodies, begin)
     both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
-    made = sample_chain(
+    states = sample_chain(
         prior,
         rows,
         denoise,
@@ -209,26 +216,26 @@ def duet_features(
         features=2 * (WIDTH + PLACE),
         batch_size=BATCH,
         progress=progress,
-        view=ChainView(denoise.kept, denoise.poses),
+        view=ChainView(denoise.row_motion, denoise.poses),
     )
-    for row, state in made:
+    for row, state in states:
         row.before = None  # what a finished row began with is needed no more
-        motion, places = _parted(state)
+        motion, places = _split_state(state)
         features = row.people[0].between(prior.smoothed(motion)) * prior.std + prior.mean
         yield PairMotion(features, net.places.decode(places).astype(np.float64))
 
 
-def _parted(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _split_state(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A row (length, 534) of the chain to two motions (2, length, 263) and, from its first frame, D (2, 4)."""
     motion = state[:, : 2 * WIDTH].reshape(-1, 2, WIDTH).swapaxes(0, 1)
     return motion, state[0, 2 * WIDTH :].reshape(2, PLACE)
 
 
-def _strung(motion: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The inverse of `_parted`: D is in the first frame, and zeros behind it."""
+def _join_state(motion: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The inverse of `_split_state`: D is in the first frame, and zeros behind it."""
     frames = motion.shape[1]
     row = motion.swapaxes(0, 1).reshape(frames, -1)
-    return np.concatenate([row, lengthened(places.reshape(1, -1), frames)], axis=1)
+    return np.concatenate([row, zero_padded(places.reshape(1, -1), frames)], axis=1)
 
 
 @dataclass(eq=False)
@@ -259,7 +266,7 @@ class _PairRow:
 
     def motions(self, state: np.ndarray) -> np.ndarray:
         """(2, frames, 263) between the seams."""
-        return self.people[0].between(_parted(state)[0])
+        return self.people[0].between(_split_state(state)[0])
 
     @property
     def length(self) -> int:
@@ -297,7 +304,7 @@ class _PairDenoiser:
             guidance = relative_pose_guidance(
                 self.prior,
                 net,
-                bound_together([one.cond for one in both_of]),
+                stack_conditions([one.cond for one in both_of]),
                 seeds=person_seeds(seed + number, 0),
                 mask=mask,
                 frozen=frozen,
@@ -305,41 +312,43 @@ class _PairDenoiser:
             )
             contact = read_contact([one[number].text for one in segments])
             bodies = Bodies.of(mask, frozen, Meeting(contact) if contact else None, still=int(before is not None))
-            kept = bodies if self.bodies and not net.silent else None
-            before = _PairRow(both_of, net, guidance, kept, before, first=number == 0)
+            edited_bodies = bodies if self.bodies and not net.silent else None
+            before = _PairRow(both_of, net, guidance, edited_bodies, before, first=number == 0)
             yield before
 
     def __call__(self, rows: Sequence[_PairRow], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
-        parts = [_parted(state) for state in states]
-        shown = [self._shown(row, places, level) for row, (_, places), level in zip(rows, parts, at, strict=True)]
+        parts = [_split_state(state) for state in states]
+        shown = [
+            self._conditioning_pose(row, places, level) for row, (_, places), level in zip(rows, parts, at, strict=True)
+        ]
         frames = [motion.shape[1] for motion, _ in parts]
         x = np.stack(
-            [join(places, lengthened(motion, max(frames))) for places, (motion, _) in zip(shown, parts, strict=True)]
+            [join(places, zero_padded(motion, max(frames))) for places, (motion, _) in zip(shown, parts, strict=True)]
         )
         denoised = self._estimates(rows, x, frames, at)
-        made = []
+        estimates = []
         for row, count, level, one, (state, _) in zip(rows, frames, at, denoised, parts, strict=True):
             places, motion = part(one)
             each = zip(motion[:, :count], row.people, strict=True)
             motion = np.stack([person.correct(part_of, level) for part_of, person in each])
-            begin = self._begin_or(places, row, level)
-            motion = self._moved(row, level, motion, begin, state=state)
+            begin = self._begin_poses_or_sampled(places, row, level)
+            motion = self._with_pose_guidance(row, level, motion, begin, state=state)
             if row.bodies:
                 state, begin = row.bodies.edit(self.prior, self.net.places, join(places, motion), level, begin)
                 places, motion = part(state)
-            made.append(_strung(motion, places))
+            estimates.append(_join_state(motion, places))
             end = row.length - max(row.overlap, 1)
             row.ends[level] = self._pair(motion, begin).crop(end, end).poses
-        return made
+        return estimates
 
-    def _shown(self, row: _PairRow, places: np.ndarray, level: int) -> np.ndarray:
+    def _conditioning_pose(self, row: _PairRow, places: np.ndarray, level: int) -> np.ndarray:
         """D as the network sees it: sampled for the first row, else the end of the row before, noised as learned."""
-        row.noise, end = places if row.noise is None else row.noise, self._begin(row, level)
+        row.noise, end = places if row.noise is None else row.noise, self._begin_poses(row, level)
         if end is None:
             return places
         return self.prior.schedule.noised(self.net.places.encode(end), level, row.noise)
 
-    def _begin(self, row: _PairRow, level: int) -> np.ndarray | None:
+    def _begin_poses(self, row: _PairRow, level: int) -> np.ndarray | None:
         """The ground poses when a row begins, by what the row before estimated one level earlier: which of the two
         moves first must not matter."""
         if row.first:
@@ -347,25 +356,27 @@ class _PairDenoiser:
         step = self.levels.index(level)
         return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
 
-    def _begin_or(self, places: np.ndarray, row: _PairRow, level: int) -> np.ndarray:
+    def _begin_poses_or_sampled(self, places: np.ndarray, row: _PairRow, level: int) -> np.ndarray:
         """The same; for the first row and at the first level what D (2, 4) says."""
-        begin = self._begin(row, level)
+        begin = self._begin_poses(row, level)
         return self.net.places.decode(places) if begin is None else begin
 
     def _pair(self, motion: np.ndarray, begin: np.ndarray) -> PairMotion:
         """A standardised motion (2, frames, 263) that begins with ground poses (2, 4)."""
         return PairMotion(motion * self.prior.std + self.prior.mean, begin)
 
-    def kept(self, row: _PairRow, state: np.ndarray, level: int) -> PairMotion:
+    def row_motion(self, row: _PairRow, state: np.ndarray, level: int) -> PairMotion:
         """A denoised row between its seams."""
-        (motion, places), one = _parted(state), row.people[0]
-        return self._pair(motion, self._begin_or(places, row, level)).crop(one.before, one.before + one.frames)
+        (motion, places), one = _split_state(state), row.people[0]
+        return self._pair(motion, self._begin_poses_or_sampled(places, row, level)).crop(
+            one.before, one.before + one.frames
+        )
 
-    def poses(self, kept: list[PairMotion]) -> Array:
-        """(2, frames, 22, 3) of what was `kept` of rows."""
-        return np.concatenate([one.places() for one in kept], axis=1)
+    def poses(self, motions: list[PairMotion]) -> Array:
+        """(2, frames, 22, 3) of the motions of rows (`row_motion`)."""
+        return np.concatenate([one.places() for one in motions], axis=1)
 
-    def _moved(
+    def _with_pose_guidance(
         self, row: _PairRow, level: int, motion: np.ndarray, begin: np.ndarray, *, state: np.ndarray
     ) -> np.ndarray:
         """The estimate of a row, its people moved to each other from where they begin."""
@@ -384,16 +395,16 @@ class _PairDenoiser:
         """Guided estimates (2, 1 + frames, numbers) of rows x (rows, 2, 1 + frames, numbers), one network call for each
         set of adapters."""
         denoised: dict[int, np.ndarray] = {}
-        for places in same_net([row.people[0] for row in rows]):
+        for places in group_by_net([row.people[0] for row in rows]):
             persons = [person for i in places for person in rows[i].people]
-            made = self._guided(
+            estimates = self._guided(
                 rows[places[0]].net,
                 persons,
                 x[places].reshape(-1, *x.shape[2:]),
                 [frames[i] for i in places],
                 [at[i] for i in places],
             )
-            denoised.update(zip(places, people(made), strict=True))
+            denoised.update(zip(places, people(estimates), strict=True))
         return [denoised[i] for i in range(len(rows))]
 
     def _guided(
@@ -401,7 +412,7 @@ class _PairDenoiser:
     ) -> np.ndarray:
         """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""
         lengths, level = (np.tile(np.repeat(each, 2), 2) for each in (frames, at))
-        bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
+        bound = stack_conditions([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
         conditional, unconditional = np.split(net(np.concatenate([x, x]), level, bound), 2)
         scale = np.array([row.guidance for row in rows], x.dtype)[:, None, None]
         return lerp(unconditional, conditional, scale)

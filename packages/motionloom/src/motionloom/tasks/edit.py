@@ -22,17 +22,29 @@ from motionloom.requests.fields import specs
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
 from motionloom.retarget import to_smpl22
+from motionloom.tasks.direct_edits import (
+    Look,
+    Nod,
+    Overlay,
+    Smooth,
+    Span,
+    SpanChange,
+    check_parts,
+    is_only_head_free,
+    joints_of,
+    kept_parts_of,
+)
 from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.laid import Lay, Look, Nod, Smooth, Span, Spanned, check_parts, joints_of, kept_joints, only_head
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
     apply_sample,
-    carried_level,
-    concatenated,
+    concatenate,
+    ground_pose_at,
+    move_on_floor,
     person_at_20,
     splice,
-    standing,
 )
+from motionloom.tasks.text import check_humanml
 from motionloom.weights.prior import Prior
 
 WINDOW = 8.0
@@ -48,7 +60,7 @@ NEAR = (0.5, np.radians(45))
 
 
 @dataclass(frozen=True)
-class Redraw(Spanned):
+class Redraw(SpanChange):
     """Some time of a clip, or some parts of it, sampled anew."""
 
     keep: Sequence[str] = ()
@@ -73,7 +85,7 @@ class Redraw(Spanned):
     def apply(self, sampler: "_Sampler", clip: Motion, seed: int) -> Motion:
         """The clip with its stretches sampled, one after the other."""
         for span in self.frames(clip):
-            clip = _redrawn(sampler, clip, span, self, seed)
+            clip = _inpaint_span(sampler, clip, span, self, seed)
         return clip
 
 
@@ -95,11 +107,11 @@ class Extend:
         """The clip and what comes behind it."""
         tail = clip.frames(max(len(clip) - round(CONTEXT[1] * clip.fps), 0), len(clip))
         added = max(round(self.seconds * clip.fps), 1)
-        window = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * added)
-        stretch = replace(_window(window, len(tail), len(window)), begin=(len(clip) - len(tail)) / clip.fps)
-        made = sampler.sample(window, stretch, seed)
-        spliced = splice(window, made, len(tail))
-        return concatenated(clip, spliced.frames(len(tail), len(window)))
+        window = concatenate(tail, *[tail.frames(len(tail) - 1, len(tail))] * added)
+        stretch = replace(_inpaint_window(window, len(tail), len(window)), begin=(len(clip) - len(tail)) / clip.fps)
+        sampled = sampler.sample(window, stretch, seed)
+        spliced = splice(window, sampled, len(tail))
+        return concatenate(clip, spliced.frames(len(tail), len(window)))
 
 
 @dataclass(frozen=True)
@@ -121,10 +133,10 @@ class Loop:
 
     def apply(self, sampler: "_Sampler", clip: Motion, seed: int) -> Motion:
         """The clip as a loop."""
-        return _looped(sampler, clip, self.blend, seed)
+        return _close_loop(sampler, clip, self.blend, seed)
 
 
-Change: TypeAlias = Redraw | Extend | Loop | Lay | Look | Nod | Smooth
+Change: TypeAlias = Redraw | Extend | Loop | Overlay | Look | Nod | Smooth
 
 
 def edit(
@@ -145,7 +157,7 @@ def edit(
         prior: weights that make HumanML3D's 263 numbers.
         motion: the clip, on any humanoid skeleton and at any rate; what is not changed comes back bit for bit.
         text: what the person does; an empty one asks for nothing in particular.
-        changes: `Redraw`, `Extend`, `Loop`, `Lay`, `Look`, `Nod` and `Smooth`, one after the other; a text
+        changes: `Redraw`, `Extend`, `Loop`, `Overlay`, `Look`, `Nod` and `Smooth`, one after the other; a text
             alone redraws the whole clip.
         skeleton: the clip's own, or the 22-joint person. The result stands where the clip stood.
         foot_lock: keep planted feet still where legs are sampled.
@@ -153,28 +165,30 @@ def edit(
         progress: called after each network call with the calls done and the calls in all.
 
     Raises:
-        MotionloomError: for what cannot be asked, and for a clip of no person (see `retarget`).
+        MotionloomError: for an impossible request, and for a clip of no person (see `retarget`).
 
     (Inpainting: Lugmayr et al. 2022; of motion: Tevet et al. 2023. Strength: Meng et al., SDEdit, 2022.)
     """
-    asked = [changes] if isinstance(changes, Change) else list(changes)
-    asked = asked or changes_asked(text)
+    requested = [changes] if isinstance(changes, Change) else list(changes)
+    requested = requested or changes_from_options(text)
     chosen = Sampling.of(sampling, settings)
     chosen.levels(prior.schedule)
     if skeleton not in ("own", "smpl"):
         raise MotionloomError(f"the skeleton is 'own' or 'smpl'; got {skeleton!r}")
-    _check(prior, motion, asked)
+    _check(prior, motion, requested)
     clip = motion if skeleton == "own" else to_smpl22(motion)
-    stages = sum(len(one.frames(clip)) if isinstance(one, Redraw) else not isinstance(one, Spanned) for one in asked)
+    stages = sum(
+        len(one.frames(clip)) if isinstance(one, Redraw) else not isinstance(one, SpanChange) for one in requested
+    )
     seeds = chosen.seeds(chosen.number())
     sampler = _Sampler(prior, text, chosen, foot_lock, _in_stages(progress, len(seeds) * stages, chosen.steps))
-    made = []
+    versions = []
     for seed in seeds:
         version = clip
-        for change in asked:
+        for change in requested:
             version = change.apply(sampler, version, seed)
-        made.append(version)
-    return made
+        versions.append(version)
+    return versions
 
 
 def close(
@@ -188,7 +202,7 @@ def close(
     return closed
 
 
-def changes_asked(
+def changes_from_options(
     text: str,
     *,
     keep: Sequence[str] = (),
@@ -201,33 +215,33 @@ def changes_asked(
     look: NDArray[np.float64] | None = None,
     smooth: float = 0.0,
 ) -> list[Change]:
-    """What single options ask for: with neither ``between`` nor ``extend`` a text is about the whole clip.
+    """The changes that single options describe: with neither ``between`` nor ``extend`` a text is about the whole clip.
 
     Where everything is kept but the head, the text says what that does (`motionloom.goals.heads`).
     source: a clip whose parts take the place of a text. look: where the head looks, as of `Look`.
-    smooth: seconds, as of `Smooth`. Raises MotionloomError where nothing is asked, and for a text beside a source.
+    smooth: seconds, as of `Smooth`. Raises MotionloomError where there is no change, and for a text beside a source.
     """
-    asked: list[Change] = []
-    said = bool(text.strip()) and not extend
+    changes: list[Change] = []
+    has_text = bool(text.strip()) and not extend
     if source is not None:
-        if said:
+        if has_text:
             raise MotionloomError("parts do what a text says or what another clip does; leave out one of them")
-        asked.append(Lay(tuple(between), source, tuple(keep)))
-    elif said and only_head(keep):
-        asked.append(Nod(tuple(between), read_head(text)))
-    elif said or (between and look is None and not smooth):
-        asked.append(Redraw(tuple(between), tuple(keep), strength))
+        changes.append(Overlay(tuple(between), source, tuple(keep)))
+    elif has_text and is_only_head_free(keep):
+        changes.append(Nod(tuple(between), read_head(text)))
+    elif has_text or (between and look is None and not smooth):
+        changes.append(Redraw(tuple(between), tuple(keep), strength))
     elif keep and not smooth:
         raise MotionloomError("kept parts belong to a text or a stretch, and there is neither; add one")
-    asked += [Smooth(tuple(between), smooth, tuple(keep))] if smooth else []
-    asked += [Look(tuple(between), look)] if look is not None else []
-    asked += [Extend(extend)] if extend else []
-    asked += [Loop(blend)] if loop else []
-    if not asked:
+    changes += [Smooth(tuple(between), smooth, tuple(keep))] if smooth else []
+    changes += [Look(tuple(between), look)] if look is not None else []
+    changes += [Extend(extend)] if extend else []
+    changes += [Loop(blend)] if loop else []
+    if not changes:
         raise MotionloomError(
             "nothing to change: say in words what to make, name a stretch, smooth, look, loop or extend"
         )
-    return asked
+    return changes
 
 
 def _in_stages(progress: Progress | None, stages: int, steps: int) -> Progress:
@@ -255,11 +269,11 @@ class _Sampler:
 
     def sample(self, motion: Motion, window: InpaintWindow, seed: int) -> Motion:
         """A clip with a window of it sampled, on its own skeleton, not yet spliced."""
-        made = inpaint_motion(self.prior, window, self.text, self.sampling, seed=seed, progress=self.progress)
-        return apply_sample(made, motion, foot_lock=self.foot_lock)
+        placed = inpaint_motion(self.prior, window, self.text, self.sampling, seed=seed, progress=self.progress)
+        return apply_sample(placed, motion, foot_lock=self.foot_lock)
 
 
-def kept_numbers(keep: Sequence[str]) -> NDArray[np.bool_]:
+def kept_feature_mask(keep: Sequence[str]) -> NDArray[np.bool_]:
     """(263,) True at the features of the kept parts."""
     chosen = layout.mask([name for name in keep if name.startswith("root")])
     joints = joints_of(keep)
@@ -277,50 +291,50 @@ def kept_numbers(keep: Sequence[str]) -> NDArray[np.bool_]:
 # What the changes do
 
 
-def _redrawn(sampler: _Sampler, motion: Motion, span: tuple[int, int], change: Redraw, seed: int) -> Motion:
+def _inpaint_span(sampler: _Sampler, motion: Motion, span: tuple[int, int], change: Redraw, seed: int) -> Motion:
     start, stop = span
     around = round(float(np.clip((WINDOW - (stop - start) / motion.fps) / 2, *CONTEXT)) * motion.fps)
     begin, end = max(start - around, 0), min(stop + around, len(motion))
     window = motion.frames(begin, end)
     first, last = start - begin, stop - begin
-    stretch = _window(window, first, last, keep=kept_numbers(change.keep), strength=change.strength)
-    made = sampler.sample(window, replace(stretch, begin=begin / motion.fps), seed)
-    spliced = splice(window, made, first, last=last, kept=kept_joints(motion, change.keep))
-    before, behind = (_some(motion.frames, span) for span in ((0, start), (stop, len(motion))))
-    return concatenated(*before, spliced.frames(first, last), *behind)
+    stretch = _inpaint_window(window, first, last, keep=kept_feature_mask(change.keep), strength=change.strength)
+    sampled = sampler.sample(window, replace(stretch, begin=begin / motion.fps), seed)
+    spliced = splice(window, sampled, first, last=last, kept=kept_parts_of(motion, change.keep))
+    before, behind = (_frames_if_any(motion.frames, span) for span in ((0, start), (stop, len(motion))))
+    return concatenate(*before, spliced.frames(first, last), *behind)
 
 
-def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motion:
+def _close_loop(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motion:
     """The end flows into the beginning: a stretch between the last frames and, moved behind them, the first ones."""
     rest, around = len(motion) - round(blend * motion.fps), round(CONTEXT[1] * motion.fps)
     tail, head = motion.frames(max(rest - around, 0), rest), motion.frames(0, min(around, rest))
-    end, start = standing(motion, len(motion) - 1), standing(motion, 0)
+    end, start = ground_pose_at(motion, len(motion) - 1), ground_pose_at(motion, 0)
     metres, radians = end.apart(start)
     straight = radians < NEAR[1]
     here = straight and metres < NEAR[0]
     if not here:
-        head = carried_level(head, start, replace(end, facing=start.facing) if straight else end)
-    gap = _between(tail, head, len(motion) - rest)
+        head = move_on_floor(head, start, replace(end, facing=start.facing) if straight else end)
+    gap = _interpolated(tail, head, len(motion) - rest)
     first, last = len(tail), len(tail) + len(gap)
-    window = concatenated(tail, gap, head)
-    stretch = _window(window, first, last)
+    window = concatenate(tail, gap, head)
+    stretch = _inpaint_window(window, first, last)
     begin = max(rest - around, 0) / motion.fps
-    made = sampler.sample(window, replace(stretch, facing=straight, place=here, begin=begin), seed)
+    sampled = sampler.sample(window, replace(stretch, facing=straight, place=here, begin=begin), seed)
     if not here:
-        arrived, left = standing(made, last), standing(window, last)
+        arrived, left = ground_pose_at(sampled, last), ground_pose_at(window, last)
         arrived = replace(arrived, facing=left.facing) if straight else arrived
-        window = concatenated(tail, gap, carried_level(head, left, arrived))
-    spliced = splice(window, made, first, last=last)
-    return concatenated(motion.frames(0, rest), spliced.frames(first, last))
+        window = concatenate(tail, gap, move_on_floor(head, left, arrived))
+    spliced = splice(window, sampled, first, last=last)
+    return concatenate(motion.frames(0, rest), spliced.frames(first, last))
 
 
-def _between(before: Motion, behind: Motion, frames: int) -> Motion:
+def _interpolated(before: Motion, behind: Motion, frames: int) -> Motion:
     """So many frames from the last one before to the first one behind, evenly."""
-    ends = concatenated(before.frames(len(before) - 1, len(before)), behind.frames(0, 1))
+    ends = concatenate(before.frames(len(before) - 1, len(before)), behind.frames(0, 1))
     return replace(replace(ends, fps=1.0).resample(frames + 1.0), fps=before.fps).frames(1, frames + 1)
 
 
-def _window(
+def _inpaint_window(
     window: Motion, first: int, last: int, *, keep: NDArray[np.bool_] | None = None, strength: float = 1.0
 ) -> InpaintWindow:
     positions = person_at_20(window)
@@ -329,18 +343,15 @@ def _window(
     return InpaintWindow(positions, at[0], stop, np.zeros(WIDTH, dtype=bool) if keep is None else keep, strength)
 
 
-def _some(frames: Callable[[int, int], Motion], span: Span) -> list[Motion]:
+def _frames_if_any(frames: Callable[[int, int], Motion], span: Span) -> list[Motion]:
     return [frames(int(span[0]), int(span[1]))] if span[0] < span[1] else []
 
 
-# What cannot be asked
+# Errors of requests
 
 
 def _check(prior: Prior, motion: Motion, changes: Sequence[Change]) -> None:
-    if len(prior.mean) != WIDTH or prior.fps != FPS:
-        raise MotionloomError(
-            f"these weights make {len(prior.mean)} numbers a frame; edits need {WIDTH} at {FPS:g} fps"
-        )
+    check_humanml(prior, "edits need")
     length = motion.seconds
     if length * FPS < SHORTEST - 1e-6 or len(motion) < 3:
         raise MotionloomError(

@@ -24,7 +24,7 @@ def inpaint_motion(
 ) -> PlacedMotion:
     """A whole window with the frames ``first`` to before ``last`` sampled by the text; the others come back to float32.
 
-    An empty text asks for nothing in particular. Frames from 0 on are placed by what follows them.
+    An empty text asks for nothing in particular. Frames from 0 on are placed by the next ones.
     """
     whole = PlacedMotion.of(window.positions)
     known = whole.features[None]
@@ -56,7 +56,7 @@ def inpaint_motion(
 
 def _placed(features: np.ndarray, whole: PlacedMotion, window: InpaintWindow) -> PlacedMotion:
     """A sampled window in the world, where the frames before the stretch are, or else those behind it."""
-    made = PlacedMotion(features, whole.begin)
+    placed = PlacedMotion(features, whole.begin)
     if window.first == 0 and window.last < len(features):
-        return made.moved_to(whole.at(window.last), window.last)
-    return made
+        return placed.moved_to(whole.at(window.last), window.last)
+    return placed

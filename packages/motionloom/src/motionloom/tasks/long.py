@@ -22,7 +22,7 @@ from motionloom.diffusion import lerp
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.layout import FPS
 from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
@@ -32,10 +32,11 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
-from motionloom.tasks.adapting import AdaptedPriors, loaded
+from motionloom.tasks.adapting import AdaptedPriors, load_adapters
 from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.sampling import Moves, sample_chain
-from motionloom.tasks.splice import concatenated, person_at_20
+from motionloom.tasks.splice import concatenate, person_at_20
+from motionloom.tasks.text import check_humanml
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
@@ -44,7 +45,7 @@ Array = NDArray[np.float64]
 BATCH = 16
 """Rows in one network call."""
 LOOK_BACK = 20
-"""Frames of an older motion that a new one is made to follow."""
+"""Frames of an older motion that a new one continues from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +109,22 @@ def compose(
         progress: called with how many more row moves were made; a segment takes as many as there are steps.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
 
     (Shafir et al. 2024, section 4, as in docs/decisions/0013.)
     """
     chosen = Sampling.of(sampling, settings).alone()
-    past, track, place = _begun(prior, chosen, start, path)
+    past, track, place = _prepare(prior, chosen, start, path)
     goals: deque[Goal | None] = deque()
 
-    def asked() -> Iterator[Segment]:
-        first = 0
+    def remember_goals() -> Iterator[Segment]:
         for segment in segments:
             goals.append(segment.goal)
-            frames = round(segment.seconds * prior.fps)
-            yield track.asked(segment, first, frames) if track else segment
-            first += frames
+            yield segment
 
-    pieces = long_features(prior, asked(), past=past, sampling=chosen, progress=progress)
-    return solve_stream(in_world(prior, pieces, goals, place, track), prior.fps, foot_lock=foot_lock)
+    on_path = segments_on(track, remember_goals(), prior.fps)
+    pieces = long_features(prior, on_path, past=past, sampling=chosen, progress=progress)
+    return solve_stream(place_pieces(prior, pieces, goals, place, track), prior.fps, foot_lock=foot_lock)
 
 
 def compose_takes(
@@ -142,31 +141,24 @@ def compose_takes(
     """As many motions of the same segments as ``count`` says, sampled in the same network calls, one after the other.
 
     Motion i is that of `compose` with ``seed + i``, up to the rounding of larger matrix products; all of them are seen
-    at once while they are denoised (`watching`). The arguments and errors are those of `compose`, but that the segments
-    are kept, so that there is an end of them.
+    at once while they are denoised (`watching`). The arguments and errors are those of `compose`, but that there is
+    an end of the segments.
     """
     chosen = Sampling.of(sampling, settings)
-    past, track, place = _begun(prior, chosen, start, path)
-    asked, first = [], 0
-    for segment in segments:
-        frames = round(segment.seconds * prior.fps)
-        asked.append(track.asked(segment, first, frames) if track else segment)
-        first += frames
-    pieces = long_features(prior, asked, past=past, sampling=chosen, progress=progress)
+    past, track, place = _prepare(prior, chosen, start, path)
+    on_path = list(segments_on(track, segments, prior.fps))
+    pieces = long_features(prior, on_path, past=past, sampling=chosen, progress=progress)
     for _ in range(chosen.number()):
         goals = deque(segment.goal for segment in segments)
-        own = in_world(prior, islice(pieces, len(asked)), goals, place, track)
-        yield concatenated(*solve_stream(own, prior.fps, foot_lock=foot_lock))
+        own = place_pieces(prior, islice(pieces, len(on_path)), goals, place, track)
+        yield concatenate(*solve_stream(own, prior.fps, foot_lock=foot_lock))
 
 
-def _begun(
+def _prepare(
     prior: Prior, sampling: Sampling, start: Motion | None, path: Goal | None
 ) -> "tuple[Past | None, Track | None, GroundPose]":
-    """What is gone on from, the path, and where the first frame is; raises for what cannot be asked."""
-    if len(prior.mean) != WIDTH or prior.fps != FPS:
-        raise MotionloomError(
-            f"these weights make {len(prior.mean)} numbers a frame; long motion needs {WIDTH} at {FPS:g} fps"
-        )
+    """The past, the path and the ground pose of frame 0; raises for impossible requests."""
+    check_humanml(prior, "long motion needs")
     sampling.levels(prior.schedule)
     past = None if start is None else Past.of(start)
     track = None if path is None else Track.along(path, prior.fps)
@@ -191,7 +183,7 @@ def long_features(
     segments then. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
     """
     chosen = Sampling.of(sampling, settings)
-    denoise = partial(_corrected, prior, chosen.levels(prior.schedule)[-2])
+    denoise = partial(_denoise_rows, prior, chosen.levels(prior.schedule)[-2])
     rows, each = chain_rows(prior, segments, chosen.guidance, past), None
     if chosen.number() > 1:
         own = list(rows)
@@ -204,7 +196,7 @@ def long_features(
     def poses(pieces: list[np.ndarray]) -> Array:
         return PlacedMotion(np.concatenate(pieces), place).positions[None]
 
-    made = sample_chain(
+    states = sample_chain(
         prior,
         rows,
         denoise,
@@ -214,15 +206,15 @@ def long_features(
         progress=progress,
         view=ChainView(features, poses, each, begin),
     )
-    for row, state in made:
+    for row, state in states:
         yield features(row, state)
 
 
-def _corrected(
+def _denoise_rows(
     prior: Prior, last: int, rows: Sequence[Row], states: Sequence[np.ndarray], at: Sequence[int]
 ) -> list[np.ndarray]:
     """Denoised states of rows, each through what corrects it."""
-    denoised = _averaged(prior, list(rows), states, at, last=last)
+    denoised = _shift_averaged(prior, list(rows), states, at, last=last)
     return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
 
@@ -247,26 +239,26 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past:
         length = before + frames + after
         own = priors.of(segment.adapters)
         bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
-        edits = [past.holder(prior, length)] if past and not number and len(past.known) else []
+        edits = [past.start_correction(prior, length)] if past and not number and len(past.known) else []
         if behind is not None and not following:
-            edits.append(holding(behind, prior, length, last=True))
+            edits.append(holding_correction(behind, prior, length, last=True))
         if segment.goal and not segment.goal.empty:
             edits.append(toward(segment.goal, prior, first=before + lead))
         scale = guidance if segment.guidance is None else segment.guidance
-        correct = _one_after_the_other(edits)
+        correct = _chain_corrections(edits)
         yield Row(segment.text, frames, before, after, overlap, scale, bound, null, correct, own.net)
         before, segment, number, lead = overlap // 2, following, number + 1, 0
 
 
-def with_loaded(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:
-    """The same segments, the files of their adapters read: what is wrong with them shows before anything is made."""
+def load_segment_adapters(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:
+    """The same segments, the files of their adapters read: errors in them are raised before anything is sampled."""
     return tuple(
-        replace(segment, adapters=loaded(prior, segment.adapters)) if segment.adapters else segment
+        replace(segment, adapters=load_adapters(prior, segment.adapters)) if segment.adapters else segment
         for segment in segments
     )
 
 
-def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
+def _chain_corrections(edits: Sequence[Correction]) -> Correction:
     def correct(clean: np.ndarray, level: int) -> np.ndarray:
         for edit in edits:
             clean = edit(clean, level)
@@ -275,7 +267,7 @@ def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
     return correct
 
 
-def _averaged(
+def _shift_averaged(
     prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int], *, last: int
 ) -> list[np.ndarray]:
     """Estimates; those of the last move are averages over all ways to divide the frames into the network's tokens.
@@ -305,14 +297,14 @@ def _averaged(
 def _estimates(prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
     """Guided estimates of rows of different lengths and levels, as one network call for each set of adapters."""
     cleans: dict[int, np.ndarray] = {}
-    for numbers in same_net(rows):
+    for numbers in group_by_net(rows):
         some = [rows[i] for i in numbers]
-        made = _estimates_of_one_net(some, [states[i] for i in numbers], [at[i] for i in numbers])
-        cleans.update(zip(numbers, made, strict=True))
+        estimates = _estimates_of_one_net(some, [states[i] for i in numbers], [at[i] for i in numbers])
+        cleans.update(zip(numbers, estimates, strict=True))
     return [cleans[i] for i in range(len(rows))]
 
 
-def same_net(rows: Sequence[Row]) -> list[list[int]]:
+def group_by_net(rows: Sequence[Row]) -> list[list[int]]:
     """Numbers of rows whose segments have the same network, group by group."""
     groups: dict[int, list[int]] = {}
     for number, row in enumerate(rows):
@@ -322,8 +314,8 @@ def same_net(rows: Sequence[Row]) -> list[list[int]]:
 
 def _estimates_of_one_net(rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
     frames = [len(state) for state in states]
-    x = np.stack([lengthened(state, max(frames)) for state in states])
-    bound = bound_together([row.cond for row in rows] + [row.null for row in rows])
+    x = np.stack([zero_padded(state, max(frames)) for state in states])
+    bound = stack_conditions([row.cond for row in rows] + [row.null for row in rows])
     bound = bound._replace(lengths=np.array([*frames, *frames]))
     answer = rows[0].net(np.concatenate([x, x]), np.array([*at, *at]), bound)
     conditional, unconditional = np.split(answer, 2)
@@ -332,22 +324,22 @@ def _estimates_of_one_net(rows: list[Row], states: Sequence[np.ndarray], at: Seq
     return [clean[:count] for clean, count in zip(guided, frames, strict=True)]
 
 
-def bound_together(bounds: list[Bound]) -> Bound:
+def stack_conditions(bounds: list[Bound]) -> Bound:
     """Rows of several conditions, their words padded to the longest."""
     most = max(one.words.shape[-1] for one in bounds)
 
     return Bound(
         np.concatenate([one.text for one in bounds]),
-        np.concatenate([lengthened(one.keys, most) for one in bounds]),
-        np.concatenate([lengthened(one.values, most) for one in bounds]),
-        np.concatenate([lengthened(one.words, most, axis=-1) for one in bounds]),
+        np.concatenate([zero_padded(one.keys, most) for one in bounds]),
+        np.concatenate([zero_padded(one.values, most) for one in bounds]),
+        np.concatenate([zero_padded(one.words, most, axis=-1) for one in bounds]),
         np.concatenate([one.lengths for one in bounds]),
         np.concatenate([one.flags for one in bounds]),
         np.concatenate([one.shown for one in bounds]),
     )
 
 
-def lengthened(array: np.ndarray, length: int, *, axis: int = -2) -> np.ndarray:
+def zero_padded(array: np.ndarray, length: int, *, axis: int = -2) -> np.ndarray:
     """An array with zeros behind it, ``length`` long along an axis (-2: frames, or words)."""
     missing = [(0, 0)] * array.ndim
     missing[axis] = 0, length - array.shape[axis]
@@ -366,7 +358,7 @@ class Past:
     end: GroundPose
     """Where the person is one frame behind them: at frame 0 of what follows."""
     behind: np.ndarray | None = None
-    """(frames, 263) features of the frames that the long motion comes to; None: it ends by itself."""
+    """(frames, 263) features of the frames that follow the long motion; None: nothing follows it."""
     lead: int = 0
     """Frames that the first piece has more, before its segment begins."""
     trail: int = 0
@@ -375,12 +367,12 @@ class Past:
     @staticmethod
     def of(motion: Motion) -> "Past":
         """Of anybody's motion, as of `last_frames`."""
-        seen = last_frames(motion)
-        return Past(seen.features, seen.end)
+        placed = last_frames(motion)
+        return Past(placed.features, placed.end)
 
-    def holder(self, prior: Prior, length: int) -> Correction:
+    def start_correction(self, prior: Prior, length: int) -> Correction:
         """Makes the first frames of a row's estimate the known ones, and the next ones leave them without a jump."""
-        return holding(self.known, prior, length)
+        return holding_correction(self.known, prior, length)
 
 
 def last_frames(motion: Motion) -> PlacedMotion:
@@ -393,7 +385,7 @@ def last_frames(motion: Motion) -> PlacedMotion:
     return PlacedMotion.of(positions[-LOOK_BACK - 1 :])
 
 
-def holding(own: np.ndarray, prior: Prior, length: int, *, last: bool = False) -> Correction:
+def holding_correction(own: np.ndarray, prior: Prior, length: int, *, last: bool = False) -> Correction:
     """Makes the first frames of a row's estimate (or the last ones) known ones, the others join them without a jump.
 
     own: (frames, 263) features, not standardised. length: frames of the row.
@@ -418,33 +410,41 @@ class Track:
     """A path for the whole, and which way it goes."""
 
     path: Goal
-    ways: Array
+    directions: Array
     """(frames,) radians."""
 
     @staticmethod
     def along(path: Goal, fps: float) -> "Track":
-        if not path.asked[:, 0, [0, 2]].all():
+        if not path.mask[:, 0, [0, 2]].all():
             raise MotionloomError("the path of a long motion must say where to be in every frame; give points for all")
-        return Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
+        return Track(path, np.where(path.facing_mask, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
 
     def place(self, frame: int) -> GroundPose:
         """Where the person is at that frame."""
         if frame == 0:
             return start_of(self.path)
         x, _, z = self.path.positions[frame, 0]
-        return GroundPose(float(x), float(z), float(self.ways[frame]))
+        return GroundPose(float(x), float(z), float(self.directions[frame]))
 
-    def asked(self, segment: Segment, first: int, frames: int) -> Segment:
+    def with_path(self, segment: Segment, first: int, frames: int) -> Segment:
         """The segment that begins with frame ``first``, with its part of the path among its targets."""
         if first + frames > len(self.path):
             raise MotionloomError(
                 f"the path has {len(self.path)} frames and the segments have more; make them equally long"
             )
-        part = self.path.crop(first, first + frames).seen_from(self.place(first))
+        part = self.path.crop(first, first + frames).relative_to(self.place(first))
         return replace(segment, goal=part if segment.goal is None else merged(part, segment.goal))
 
 
-def in_world(
+def segments_on(track: Track | None, segments: Iterable[Segment], fps: float, first: int = 0) -> Iterator[Segment]:
+    """The segments, each with its part of the path among its targets; they begin with frame ``first`` of the path."""
+    for segment in segments:
+        frames = round(segment.seconds * fps)
+        yield track.with_path(segment, first, frames) if track else segment
+        first += frames
+
+
+def place_pieces(
     prior: Prior,
     pieces: Iterable[np.ndarray],
     goals: deque[Goal | None],
@@ -458,11 +458,11 @@ def in_world(
     """
     mean, spread = prior.mean, prior.spread
     for piece in pieces:
-        asked = goals.popleft()
-        goal = Goal.nothing(len(piece)) if asked is None else asked.placed(place)
+        own_goal = goals.popleft()
+        goal = Goal.nothing(len(piece)) if own_goal is None else own_goal.placed(place)
         if track:
             part = track.path.crop(first, first + len(piece))
-            piece = toward(part.seen_from(place), prior)((piece - mean) / spread, 0) * spread + mean
+            piece = toward(part.relative_to(place), prior)((piece - mean) / spread, 0) * spread + mean
             goal = overlaid(part, goal)
         placed = PlacedMotion(piece, place)
         yield Places(placed.positions, placed.contacts, goal)

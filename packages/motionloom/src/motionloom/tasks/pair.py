@@ -28,9 +28,9 @@ from motionloom.requests.sampling import PairSampling, PairSettings, Seed
 from motionloom.requests.shared import LONGEST
 from motionloom.runtime.pair import PairSession, people
 from motionloom.tasks.long import Past
-from motionloom.tasks.people import Duet, Pasts, finish_person, known_state
+from motionloom.tasks.people import Duet, PairPast, finish_person, known_state
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
-from motionloom.tasks.text import frames_in
+from motionloom.tasks.text import check_goal_length, check_humanml, frames_in
 from motionloom.tasks.watching import View
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -40,7 +40,7 @@ Prompt = str | tuple[str, str]
 PAIRS = 8
 """Pairs denoised at once."""
 MOST = 10_000.0
-"""Seconds of all duets together that are made in one call."""
+"""Seconds of all duets of one call together, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class PairEdits:
     corrections: Sequence[Correction | None] | None = None
     """What each row's denoised motion (frames, 263), standardised, goes through, as of `steering`."""
     frozen: Sequence[bool] | None = None
-    """Whose motion is not moved by pair guidance; those that are corrected, unless said otherwise."""
+    """Whose motion is not moved by pair guidance; those that are corrected where this is None."""
     meetings: Sequence[Meeting | None] | None = None
     """How the two of each pair touch."""
 
@@ -80,41 +80,44 @@ def pair_features(
         sampling: or single settings of it as keywords; ``batch_size`` counts pairs.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
     """
-    chosen, rows, given = PairSampling.of(sampling, settings), len(prompts), edits or PairEdits()
-    changes, meetings = list(given.corrections or [None] * rows), given.meetings or [None] * (rows // 2)
-    frozen = [one is not None for one in changes] if given.frozen is None else list(given.frozen)
+    chosen, rows, row_edits = PairSampling.of(sampling, settings), len(prompts), edits or PairEdits()
+    changes, meetings = (
+        list(row_edits.corrections or [None] * rows),
+        row_edits.meetings or [None] * (rows // 2),
+    )
+    frozen = [one is not None for one in changes] if row_edits.frozen is None else list(row_edits.frozen)
     if rows % 2 or rows == 0 or {len(seeds), len(changes), len(frozen)} != {rows}:
         raise MotionloomError(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
-    known = False if given.observed is None else given.observed.mask
+    known = False if row_edits.observed is None else row_edits.observed.mask
     mask = np.broadcast_to(known, (rows, 1 + frames, len(prior.mean)))
-    changed = _Changed(prior, net, chosen, changes, frozen, mask, meetings)
+    changed = _PairEdit(prior, net, chosen, changes, frozen, mask, meetings)
     guidance = chosen.guidance if any(prompt.strip() for prompt in prompts) else 1.0
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=guidance)
-    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise, slots=1)
+    batch_rows = Rows(prompts, [1 + frames] * rows, seeds, pair_noise, slots=1)
     view = View(lambda states: net.pairs(states).places().astype(np.float64), people=2)
-    made = dict(
+    states = dict(
         sample(
             prior,
-            asked,
+            batch_rows,
             how,
             network=net,
             edits=[changed],
             corrected=True,
-            observed=given.observed,
+            observed=row_edits.observed,
             progress=progress,
             view=view,
         )
     )
-    return net.pairs(np.stack([made[row] for row in range(rows)]))
+    return net.pairs(np.stack([states[row] for row in range(rows)]))
 
 
 @dataclass(frozen=True, eq=False)
-class _Changed:
-    """Estimates of rows, changed by their corrections, by what the block says of them later on, and as bodies."""
+class _PairEdit:
+    """Estimates of rows, changed by their corrections, by the block's pose guidance, and as bodies."""
 
     prior: Prior
     net: PairSession
@@ -124,7 +127,7 @@ class _Changed:
     mask: np.ndarray
     """(rows, 1 + frames, 263) True where states are known."""
     meetings: Sequence[Meeting | None]
-    """Of each pair; what is found of one in its rows is kept there."""
+    """Of each pair; what its rows find out about it is stored there."""
 
     def __call__(self, denoise: Denoiser, batch: Batch) -> Denoiser:
         """The denoiser of some rows, changed; an edit of `sample`."""
@@ -146,8 +149,8 @@ class _Changed:
             if not self.sampling.bodies or net.silent:
                 return clean
             pairs = zip(bodies, people(clean), strict=True)
-            made = [one.edit(prior, net.places, pair, level)[0] for one, pair in pairs]
-            return np.where(mask, clean, np.concatenate(made))
+            bodies_edited = [one.edit(prior, net.places, pair, level)[0] for one, pair in pairs]
+            return np.where(mask, clean, np.concatenate(bodies_edited))
 
         return changed
 
@@ -166,7 +169,7 @@ def person_seeds(seed: Seed, number: int) -> tuple[int, int]:
 
 
 def pair_seeds(sampling: PairSampling) -> list[int]:
-    """One seed per row of as many duets as are to be made."""
+    """One seed per row of all duets of a sampling."""
     return [seed for number in sampling.numbers() for seed in person_seeds(sampling.seed, number)]
 
 
@@ -197,7 +200,7 @@ def generate_pair(
         block: what makes two people of one prior.
         prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` says the same.
         seconds: length; not looked at where there is a goal, which has its own.
-        goals: what the first and the second person are asked to do in the world, who then start at its `start_of`; two
+        goals: targets of the first and the second person in the world, who then start at its `start_of`; two
             goals are of one length. Without any the first person starts at the origin facing +Z.
         foot_lock: keep planted feet still.
         sampling: or single settings of it as keywords. Duet i depends on ``seed`` and i alone; two seeds are one for
@@ -205,51 +208,46 @@ def generate_pair(
         progress: called after each network call with the calls done and the calls in all.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
     """
-    said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
-    if not all(words.strip() for words in said):
+    prompts, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
+    if not all(words.strip() for words in prompts):
         raise MotionloomError("a prompt is empty; say in words what the two people do")
     goal = goals[0] or goals[1]
     check_pair(prior, count=chosen.number(), seconds=len(goal) / FPS if goal else seconds)
     frames = _goal_frames(goals) if goal else frames_in(seconds, prior.fps)
     starts = [start_of(one) if one else GroundPose() for one in goals]
-    change = [toward(one.seen_from(start), prior) if one else None for one, start in zip(goals, starts, strict=True)]
+    change = [toward(one.relative_to(start), prior) if one else None for one, start in zip(goals, starts, strict=True)]
     person, net = 0 if goals[0] or not goals[1] else 1, block.net(prior)
-    count, meetings = chosen.number(), meetings_of(said, chosen)
-    begun = PairMotion(np.zeros((2, 0, WIDTH)), np.stack([start.numbers() for start in starts]))
-    known = known_state(net, PairMotion.stack([begun] * count), frames) if all(goals) else None
+    count, meetings = chosen.number(), meetings_of(prompts, chosen)
+    first_poses = PairMotion(np.zeros((2, 0, WIDTH)), np.stack([start.numbers() for start in starts]))
+    known = known_state(net, PairMotion.stack([first_poses] * count), frames) if all(goals) else None
     edits = PairEdits(known, change * count, meetings=meetings)
     sampled = pair_features(
-        prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
+        prior, net, prompts * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
     )
-    made = []
+    duets = []
     for one, meeting in zip(sampled.each(), meetings, strict=True):
         one = one.moved_to(starts[person].numbers(), person) if goal else one
         duet = [finish_person(prior, one, i, foot_lock=foot_lock) for i in (0, 1)]
         duet = [fit(one, goal) if goal else one for one, goal in zip(duet, goals, strict=True)]
-        made.append(met(duet, meeting, goals) if chosen.bodies else (duet[0], duet[1]))
-    return made
+        duets.append(met(duet, meeting, goals) if chosen.bodies else (duet[0], duet[1]))
+    return duets
 
 
 def _goal_frames(goals: Sequence[Goal | None]) -> int:
     goal, *others = (goal for goal in goals if goal)
-    longest = round(LONGEST * FPS)
     if any(len(other) != len(goal) for other in others):
         raise MotionloomError(
             f"the goals of the two people have {len(goal)} and {len(others[0])} frames; give both the same length"
         )
-    if not 4 <= len(goal) <= longest:
-        raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
+    check_goal_length(goal, FPS)
     return len(goal)
 
 
 def check_pair(prior: Prior, *, count: int = 1, seconds: float = 0.0) -> None:
     """Raise MotionloomError for weights that make no two people, and for more than one call makes."""
-    if len(prior.mean) != WIDTH or prior.fps != FPS:
-        raise MotionloomError(
-            f"these weights make {len(prior.mean)} numbers a frame; two people need {WIDTH} at {FPS:g} fps"
-        )
+    check_humanml(prior, "two people need")
     if count > 1 and count * seconds > MOST:
         raise MotionloomError(
             f"{count} duets of {seconds:g} s cannot be made in one call; ask for 1 or more, of {MOST:g} s together"
@@ -282,30 +280,30 @@ def complete_pair(
 
     Args:
         past: motions of two people in one world, of equal rate and length, a second or more; each on any humanoid
-            skeleton that stands upright along +Y, which it keeps. The last `SEEN` frames (at 20 per second) are seen.
+            skeleton that stands upright along +Y, which it keeps. The network sees the last `PAST_FRAMES`.
         prompt: as of `generate_pair`; an empty one asks for nothing in particular.
         seconds: how far to go on.
         foot_lock: keep planted feet still.
         sampling, progress: as of `generate_pair`.
 
     Raises:
-        MotionloomError: for what cannot be asked, also as `data.pairs.together` does.
+        MotionloomError: for an impossible request, also as `data.pairs.together` does.
     """
-    said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
+    prompts, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     check_pair(prior, count=chosen.number(), seconds=seconds)
     if not 0 < seconds <= LONGEST:
         raise MotionloomError(f"two people cannot go on for {seconds:g} s; ask for more than 0 and at most {LONGEST:g}")
-    pasts, added = Pasts.of(past), max(round(seconds * past[0].fps), 1)
+    pasts, added = PairPast.of(past), max(round(seconds * past[0].fps), 1)
     frames = pasts.known.features.shape[-2] + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
     net, count = block.net(prior), chosen.number()
-    leaving = [Past(one, GroundPose()).holder(prior, frames) for one in pasts.known.features]
+    leaving = [Past(one, GroundPose()).start_correction(prior, frames) for one in pasts.known.features]
     edits = PairEdits(
         known_state(net, PairMotion.stack([pasts.known] * count), frames),
         leaving * count,
         frozen=[False] * (2 * count),
-        meetings=meetings_of(said, chosen),
+        meetings=meetings_of(prompts, chosen),
     )
     sampled = pair_features(
-        prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
+        prior, net, prompts * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
     )
-    return [pasts.continued(one, added, foot_lock=foot_lock) for one in sampled.each()]
+    return [pasts.extend(one, added, foot_lock=foot_lock) for one in sampled.each()]

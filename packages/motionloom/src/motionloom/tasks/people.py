@@ -22,7 +22,7 @@ from motionloom.retarget.anatomy import read_body
 from motionloom.runtime.pair import PairSession
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.sampling import Observed
-from motionloom.tasks.splice import apply_positions, concatenated, continued, person_at, person_at_20
+from motionloom.tasks.splice import apply_positions, concatenate, continue_motion, person_at, person_at_20
 from motionloom.tasks.text import finish
 from motionloom.weights.prior import Prior
 
@@ -33,10 +33,10 @@ SHORTEST = 1.0
 """Seconds of the shortest motion that somebody can react to."""
 CONTEXT = 3.0
 """Seconds of a motion that are looked at for where its floor is."""
-SEEN = 40
-"""Frames of a past, at 20 per second, that the network sees."""
-LEAST = 4
-"""Frames behind a past that are put on a skeleton at once, at least, for its seam to fade over."""
+PAST_FRAMES = 40
+"""Frames of a past that the network sees, at 20 per second."""
+SHORTEST_SEAM = 4
+"""Frames behind a past that are retargeted at once, at least, for its seam to fade over."""
 _UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -59,7 +59,7 @@ def finish_person(prior: Prior, pair: PairMotion, person: int, *, foot_lock: boo
 
 @dataclass(frozen=True, eq=False)
 class Partner:
-    """Somebody who is answered."""
+    """A person to whose motion a second one is sampled."""
 
     motion: Motion
     known: PairMotion
@@ -100,19 +100,19 @@ class Partner:
 
 
 @dataclass(frozen=True, eq=False)
-class Pasts:
+class PairPast:
     """Two people who go on: their own motions, and the one ground on which both are uniform people (`data.pairs`)."""
 
     motions: Duet
     legs: tuple[float, float]
     """Metres."""
     known: PairMotion
-    """Their last frames at 20 per second, up to `SEEN`, on that ground."""
+    """Their last frames at 20 per second, up to `PAST_FRAMES`, on that ground."""
     floors: Array
     """(2,) metres: the heights that their features call 0."""
 
     @staticmethod
-    def of(motions: Duet) -> "Pasts":
+    def of(motions: Duet) -> "PairPast":
         """Raises `MotionloomError` as `data.pairs.together` does."""
         first, second = motions
         alike = len(first) == len(second) and abs(first.fps - second.fps) <= 1e-3 * first.fps
@@ -121,31 +121,31 @@ class Pasts:
         together(tails[0], tails[1], name="the past of the two")
         legs = read_body(first.skeleton).leg, read_body(second.skeleton).leg
         last, rate = len(tails[0]) - 1, first.fps / FPS
-        at = last - np.arange(min(int(last / rate + 1e-6) + 1, SEEN))[::-1] * rate
+        at = last - np.arange(min(int(last / rate + 1e-6) + 1, PAST_FRAMES))[::-1] * rate
         places = one_world([person_at(tail, at) for tail in tails], legs)
         places = np.concatenate([places, 2 * places[:, -1:] - places[:, -2:-1]], axis=1)  # the last goes straight on
-        return Pasts(motions, legs, two.encode(places), two.floors(places))
+        return PairPast(motions, legs, two.encode(places), two.floors(places))
 
-    def own(self, person: int, places: Array) -> Array:
+    def to_own_scale(self, person: int, places: Array) -> Array:
         """Places (frames, 22, 3) on the common ground as the uniform person that ``person`` alone is: `one_world`
         undone."""
         ratio = float(np.mean(self.legs)) / self.legs[person]
         return places + (ratio - 1.0) * places[:, :1] * np.array([1.0, 0.0, 1.0])
 
-    def continued(self, sampled: PairMotion, added: int, *, foot_lock: bool) -> Duet:
+    def extend(self, sampled: PairMotion, added: int, *, foot_lock: bool) -> Duet:
         """The motions with ``added`` frames more, of a sampled pair that begins with what is known."""
         features = sampled.features.astype(np.float64)
         places = PairMotion(features, self.known.poses).places() + self.floors[:, None, None, None] * _UP
         contacts = features[..., LAYOUT["contacts"]]
-        first, second = (self._continued(i, places[i], contacts[i], added, foot_lock) for i in (0, 1))
+        first, second = (self._extend_person(i, places[i], contacts[i], added, foot_lock) for i in (0, 1))
         return first, second
 
-    def _continued(self, person: int, places: Array, contacts: Array, added: int, foot_lock: bool) -> Motion:
+    def _extend_person(self, person: int, places: Array, contacts: Array, added: int, foot_lock: bool) -> Motion:
         motion, last = self.motions[person], self.known.features.shape[-2] - 1
         shown = int(last / FPS * motion.fps + 1e-6) + 1
         tail = motion.frames(len(motion) - shown, len(motion))
-        at = (np.arange(shown + max(added, LEAST)) - (shown - 1)) / motion.fps * FPS + last
+        at = (np.arange(shown + max(added, SHORTEST_SEAM)) - (shown - 1)) / motion.fps * FPS + last
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
-        sampled = positions_at(self.own(person, places), at)
-        new = continued(tail, sampled, contacts=contacts[nearest], foot_lock=foot_lock)
-        return concatenated(motion, new.frames(0, added))
+        sampled = positions_at(self.to_own_scale(person, places), at)
+        new = continue_motion(tail, sampled, contacts=contacts[nearest], foot_lock=foot_lock)
+        return concatenate(motion, new.frames(0, added))

@@ -23,10 +23,10 @@ from motionloom.requests.predict import DAY
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import FUTURES, Known
-from motionloom.tasks.held import Given, check_like, given
+from motionloom.tasks.held_parts import HeldParts, check_like, prepare_hold
 from motionloom.tasks.sampling import Progress
-from motionloom.tasks.splice import apply_positions, carried_level, concatenated, continued, splice, standing
-from motionloom.tasks.windows import CONTEXT, Past, WindowSampler, windows_for
+from motionloom.tasks.splice import apply_positions, concatenate, continue_motion, ground_pose_at, move_on_floor, splice
+from motionloom.tasks.windows import CONTEXT, Past, WindowSampler, window_count
 from motionloom.weights.predictor import Predictor
 
 __all__ = ["FixedJoints", "FixedPart", "predict", "predict_pieces", "switch"]
@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 WHOLE = 600.0
 """Seconds above which motions come in pieces only (`predict_pieces`)."""
 MOST = 6000.0
-"""Seconds of all futures together that are made at once."""
+"""Seconds of all futures of one call together, at most."""
 CHUNK = 8.0
 """Seconds that become a body at once."""
 ARRIVAL = 0.75
@@ -72,25 +72,29 @@ def predict(
         progress: called after each window with the windows done and the windows in all.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
     """
     chosen = PredictionSampling.of(sampling, settings)
     count = chosen.number(FUTURES)
     _check(predictor, past.fps, seconds, count=count, sampling=chosen, longest=WHOLE)
-    seen = Past.of(predictor, past)
+    history = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
-    parts = given(predictor, seen, hold, seconds) if hold else None
-    [seed], count_of = replace(chosen, first=0).seeds(1), windows_for(predictor, total / past.fps)
+    parts = prepare_hold(predictor, history, hold, seconds) if hold else None
+    [seed], count_of = replace(chosen, first=0).seeds(1), window_count(predictor, total / past.fps)
     sampler = WindowSampler(predictor, chosen, root)
-    person = np.broadcast_to(seen.person, (count, *seen.person.shape))
-    made = sampler.windows(person, [(seed, i) for i in chosen.numbers(FUTURES)], parts and parts.known, count_of)
+    person = np.broadcast_to(history.person, (count, *history.person.shape))
+    windows_sampled = sampler.windows(
+        person, [(seed, i) for i in chosen.numbers(FUTURES)], parts and parts.known, count_of
+    )
     windows = []
-    for window in made:
+    for window in windows_sampled:
         windows.append(window)
         if progress:
             progress(len(windows), count_of)
     return [
-        concatenated(past, *_on_past(seen, (one[row] for one in windows), total, hold=parts, foot_lock=foot_lock))
+        concatenate(
+            past, *_continue_past(history, (one[row] for one in windows), total, hold=parts, foot_lock=foot_lock)
+        )
         for row in range(count)
     ]
 
@@ -113,16 +117,18 @@ def predict_pieces(
     """
     chosen = PredictionSampling.of(sampling, settings).alone()
     _check(predictor, past.fps, seconds, count=1, sampling=chosen, longest=DAY)
-    seen = Past.of(predictor, past)
+    history = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
-    parts = given(predictor, seen, hold, seconds) if hold else None
+    parts = prepare_hold(predictor, history, hold, seconds) if hold else None
     windows = WindowSampler(predictor, chosen, root).windows(
-        seen.person[None],
+        history.person[None],
         [(chosen.seeds(1)[0], number)],
         parts and parts.known,
-        windows_for(predictor, total / past.fps),
+        window_count(predictor, total / past.fps),
     )
-    yield from chain([past], _on_past(seen, (window[0] for window in windows), total, hold=parts, foot_lock=foot_lock))
+    yield from chain(
+        [past], _continue_past(history, (window[0] for window in windows), total, hold=parts, foot_lock=foot_lock)
+    )
 
 
 def switch(
@@ -138,7 +144,7 @@ def switch(
 ) -> list[Motion]:
     """Motions of the past, ``seconds`` in between, and the target from its first frame on.
 
-    The past stays bit for bit; the target is put where the sampled person arrives, moved along the ground.
+    The past stays bit for bit; the target is moved along the ground to where the sampled person arrives.
 
     Args:
         past, target: of one skeleton and rate.
@@ -148,7 +154,7 @@ def switch(
         sampling: or single settings of it as keywords; one motion is made unless ``count`` says otherwise.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
 
     ("Motion switch", Chen et al. 2023, section 4.5; there the target is approached only.)
     """
@@ -163,22 +169,22 @@ def switch(
     gap = max(round(seconds * past.fps), 1)
     near = int(ARRIVAL * (predictor.frames - predictor.observed) / predictor.fps * past.fps)
     free = max(gap - max(near, 1), 0)
-    begun = [past]
+    motions = [past]
     if free:
-        begun = predict(predictor, past, seconds=free / past.fps, sampling=chosen, foot_lock=foot_lock)
-    pasts = [Past.of(predictor, one) for one in begun]
+        motions = predict(predictor, past, seconds=free / past.fps, sampling=chosen, foot_lock=foot_lock)
+    pasts = [Past.of(predictor, one) for one in motions]
     pasts = pasts if free else pasts * chosen.number()
     sampler = WindowSampler(predictor, replace(chosen, first=0))
     return [
-        _arriving(sampler, one, target, gap - free, number=i, facing=facing, foot_lock=foot_lock)
+        _arrive(sampler, one, target, gap - free, number=i, facing=facing, foot_lock=foot_lock)
         for i, one in enumerate(pasts, start=chosen.first)
     ]
 
 
-def _arriving(
-    sampler: WindowSampler, seen: Past, target: Motion, gap: int, *, number: int, facing: str, foot_lock: bool
+def _arrive(
+    sampler: WindowSampler, history: Past, target: Motion, gap: int, *, number: int, facing: str, foot_lock: bool
 ) -> Motion:
-    predictor, past, person, rate, tail = sampler.predictor, seen.motion, seen.person, seen.rate, seen.tail
+    predictor, past, person, rate, tail = sampler.predictor, history.motion, history.person, history.rate, history.tail
     arrival = (gap + 1) * rate
     room = predictor.frames - len(person)
     shown = max(min(TARGET * predictor.fps, (len(target) - 1) * rate), 2.0)  # two places of the grid give a velocity
@@ -194,28 +200,28 @@ def _arriving(
     seeds = [(sampler.sampling.seeds(1)[0], number)]
     places = sampler.window(person[None], seeds, 2**20, Known(goal, mask), frames=last)[0]
     behind = min(len(target), int((last - arrival) / rate) + 1)
-    pads = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * (gap + behind))
+    pads = concatenate(tail, *[tail.frames(len(tail) - 1, len(tail))] * (gap + behind))
     times = (np.arange(len(pads)) - (len(tail) - 1)) * rate + len(person) - 1
     grid = positions_at(np.concatenate([person, places]), times)
-    made = apply_positions(grid, pads, foot_lock=foot_lock, known=len(tail))
+    sampled = apply_positions(grid, pads, foot_lock=foot_lock, known=len(tail))
     first = len(tail) + gap
-    begin = standing(target, 0)
-    moved = carried_level(target, begin, replace(standing(made, first), facing=begin.facing + turn))
-    window = concatenated(tail, pads.frames(len(tail), first), moved.frames(0, behind))
-    spliced = splice(window, made, len(tail), last=first)
-    return concatenated(past, spliced.frames(len(tail), first), moved)
+    begin = ground_pose_at(target, 0)
+    moved = move_on_floor(target, begin, replace(ground_pose_at(sampled, first), facing=begin.facing + turn))
+    window = concatenate(tail, pads.frames(len(tail), first), moved.frames(0, behind))
+    spliced = splice(window, sampled, len(tail), last=first)
+    return concatenate(past, spliced.frames(len(tail), first), moved)
 
 
 # Onto the past's skeleton
 
 
-def _on_past(
-    past: Past, windows: Iterable[Array], total: int, *, hold: Given | None, foot_lock: bool
+def _continue_past(
+    past: Past, windows: Iterable[Array], total: int, *, hold: HeldParts | None, foot_lock: bool
 ) -> Iterator[Motion]:
     """``total`` frames behind the past, in pieces of about `CHUNK` seconds; ``windows`` (frames, 22, 3) are read as
     needed."""
     fps, rate, tail, grid = past.motion.fps, past.rate, past.tail, past.person
-    seen, kept, done = len(tail), 2 * past.observed, 0
+    tail_length, longest_grid, done = len(tail), 2 * past.observed, 0
     zero = len(grid) - 1  # the grid's index of the past's last frame
     for places in windows:
         grid = np.concatenate([grid, places])
@@ -223,19 +229,19 @@ def _on_past(
         if ready < total and ready - done < CHUNK * fps:
             continue
         at = (done + np.arange(len(tail) + ready - done) - (len(tail) - 1)) * rate + zero
-        new = continued(tail, positions_at(grid, at), foot_lock=foot_lock)
-        new = hold.laid_over(new, done) if hold else new
+        new = continue_motion(tail, positions_at(grid, at), foot_lock=foot_lock)
+        new = hold.overlay_on(new, done) if hold else new
         yield new
         done = ready
-        tail = concatenated(tail, new)
-        tail = tail.frames(max(len(tail) - seen, 0), len(tail))
-        drop = max(int(done * rate + zero) - kept, 0)
+        tail = concatenate(tail, new)
+        tail = tail.frames(max(len(tail) - tail_length, 0), len(tail))
+        drop = max(int(done * rate + zero) - longest_grid, 0)
         grid, zero = grid[drop:], zero - drop
         if done == total:
             return
 
 
-# What cannot be asked
+# Errors of requests
 
 
 def _check(

@@ -1,6 +1,6 @@
 """A long motion after a change of its timeline: only what changed is sampled, the other blocks keep their frames.
 
-A block is named by what it asks (`Block.asks`): words, length, goals, its part of the path, and how it is sampled. The
+A block is named by a digest of its request (`Block.digest`): words, length, goals, part of the path, sampling. The
 blocks that an old motion was sampled from are compared with the new ones; each run of changed blocks is sampled with
 half a transition of its neighbours on either side, between known frames of the old motion, as a chain of its own
 (`long.chain_rows`). Outside of that the frames are the old ones bit for bit. What lies behind a run moves rigidly to
@@ -27,18 +27,18 @@ from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion, ground_pose
 from motionloom.requests.sampling import Sampling
-from motionloom.tasks.body import Places, strung
-from motionloom.tasks.long import LOOK_BACK, Past, Track, in_world, long_features
+from motionloom.tasks.body import Places, join_places
+from motionloom.tasks.long import LOOK_BACK, Past, Track, long_features, place_pieces, segments_on
 from motionloom.tasks.sampling import Moves
-from motionloom.tasks.splice import carried_level, concatenated, splice
+from motionloom.tasks.splice import concatenate, move_on_floor, splice
 from motionloom.weights.prior import Prior
 
 
 class Block(NamedTuple):
     """What a block of a long motion was sampled from; plain values, so that a motion's file can keep them."""
 
-    asks: str
-    """Digest of what it asks and how it was sampled, its neighbours apart."""
+    digest: str
+    """Of its request and how it was sampled, its neighbours apart."""
     frames: int
     half: int
     """Frames of the transition to the next one, on either side of the seam."""
@@ -78,26 +78,26 @@ class Timed:
             frames = round(one.seconds * self.prior.fps)
             digest = hashlib.sha256(repr((base, one.text, frames, one.guidance)).encode())
             for goal in (one.goal, self.track and self.track.path.crop(first, first + frames)):
-                _add(digest, goal)
+                _update_digest(digest, goal)
             half = max(1, round(one.transition * self.prior.fps / 2))
             result.append(Block(digest.hexdigest()[:20], frames, half))
             first += frames
         return result
 
 
-def runs_of(old: Sequence[Block], timed: Timed) -> list[Run] | None:
+def changed_runs(old: Sequence[Block], timed: Timed) -> list[Run] | None:
     """The runs of blocks that have to be sampled, in order; None where no block stays.
 
     A seam whose transition changed is a run of no block.
     """
     new = timed.blocks
     first, least = 0, min(len(old), len(new))
-    while first < least and old[first].asks == new[first].asks:
+    while first < least and old[first].digest == new[first].digest:
         first += 1
     rest = 0
-    while rest < least - first and old[-1 - rest].asks == new[-1 - rest].asks:
+    while rest < least - first and old[-1 - rest].digest == new[-1 - rest].digest:
         rest += 1
-    some, others = ([one.asks for one in blocks[first : len(blocks) - rest]] for blocks in (old, new))
+    some, others = ([one.digest for one in blocks[first : len(blocks) - rest]] for blocks in (old, new))
     same: list[tuple[int, int, int]] = []
     if len(some) == len(others):
         same = [(k, k, 1) for k, (one, other) in enumerate(zip(some, others, strict=True)) if one == other]
@@ -108,43 +108,45 @@ def runs_of(old: Sequence[Block], timed: Timed) -> list[Run] | None:
     pairs += [(first + i + k, first + j + k) for i, j, size in same for k in range(size)]
     pairs += [(len(old) - k, len(new) - k) for k in range(rest, 0, -1)]
     pairs = _without_goals_at_seams(pairs, old, timed)
-    found, at = [], (-1, -1)
+    runs, at = [], (-1, -1)
     for i, j in [*pairs, (len(old), len(new))]:
         seam = 0 < j < len(new) and (i, j) == (at[0] + 1, at[1] + 1) and old[i - 1].half != new[j - 1].half
         if seam or (i, j) != (at[0] + 1, at[1] + 1):
-            found.append(Run(at[0] + 1, i, at[1] + 1, j))
+            runs.append(Run(at[0] + 1, i, at[1] + 1, j))
         at = i, j
-    return found if pairs else None
+    return runs if pairs else None
 
 
-def redrawn(
+def resample_runs(
     timed: Timed, old: Motion, was: Sequence[Block], runs: Sequence[Run], progress: Moves | None = None
 ) -> Motion:
     """The old motion with each run sampled, one after the other.
 
     Args:
-        timed: what is asked.
+        timed: the new timeline.
         old: the 22-joint person at 20 frames per second.
         was: what it was sampled from.
-        runs: of `runs_of`; at least one block is in none of them.
+        runs: of `changed_runs`; at least one block is in none of them.
         progress: as of `long.compose`.
     """
-    begins, old_begins = _begins(timed.blocks), _begins(was)
+    begins, old_begins = _first_frames(timed.blocks), _first_frames(was)
     for run in runs:
         lead, trail = _margins(run, was, timed.blocks)
         moved = begins[run.first] - old_begins[run.old_first]
         first = begins[run.first] - lead
-        old = _sampled(timed, old, run, _Stretch(first, old_begins[run.old_end] + moved + trail, lead, trail), progress)
+        old = _sample_run(
+            timed, old, run, _Stretch(first, old_begins[run.old_end] + moved + trail, lead, trail), progress
+        )
     return old
 
 
-def blocks_from(kept: Any, frames: int) -> list[Block]:
-    """Blocks as they were kept with a motion of so many frames, from plain values; none where they do not fit it."""
-    if not isinstance(kept, list) or not all(isinstance(one, list) and len(one) == 3 for one in kept):
+def blocks_from(values: Any, frames: int) -> list[Block]:
+    """Blocks from the plain values in the file of a motion of so many frames; none where they do not fit it."""
+    if not isinstance(values, list) or not all(isinstance(one, list) and len(one) == 3 for one in values):
         return []
-    blocks = [Block(*one) for one in kept]
+    blocks = [Block(*one) for one in values]
     for one in blocks:
-        if not (isinstance(one.asks, str) and isinstance(one.frames, int) and isinstance(one.half, int)):
+        if not (isinstance(one.digest, str) and isinstance(one.frames, int) and isinstance(one.half, int)):
             return []
     sound = all(0 < one.half <= one.frames for one in blocks)
     return blocks if sound and sum(one.frames for one in blocks) == frames else []
@@ -165,38 +167,40 @@ class _Stretch(NamedTuple):
     """How many of them lie behind the last one."""
 
 
-def _add(digest: Any, goal: Goal | None) -> None:
-    """Take what a goal asks into a digest."""
+def _update_digest(digest: Any, goal: Goal | None) -> None:
+    """Add the targets of a goal to a digest."""
     if goal is None or goal.empty:
         digest.update(b"nothing")
         return
-    for asked, values in ((goal.asked, goal.positions), (goal.facing_asked, goal.facing)):
-        digest.update(np.ascontiguousarray(asked).tobytes() + np.where(asked, values, 0.0).tobytes())
+    for mask, targets in ((goal.mask, goal.positions), (goal.facing_mask, goal.facing)):
+        digest.update(np.ascontiguousarray(mask).tobytes() + np.where(mask, targets, 0.0).tobytes())
 
 
 def _without_goals_at_seams(pairs: list[tuple[int, int]], old: Sequence[Block], timed: Timed) -> list[tuple[int, int]]:
-    """Pairs of blocks that stay, without those that are asked for something where a transition is sampled again."""
+    """Pairs of blocks that stay, without those that have targets where a transition is sampled again."""
     new, left, before = timed.blocks, pairs, None
     while left != before:
         before, known = left, {*left, (-1, -1), (len(old), len(new))}
-        left = [(i, j) for i, j in before if not _asked_at_seams(timed, old, i, j, known)]
+        left = [(i, j) for i, j in before if not _has_targets_at_seams(timed, old, i, j, known)]
     return left
 
 
-def _asked_at_seams(timed: Timed, old: Sequence[Block], i: int, j: int, known: Container[tuple[int, int]]) -> bool:
-    """Whether block j, which was i, is asked for something near a neighbour that is not among the known pairs."""
+def _has_targets_at_seams(
+    timed: Timed, old: Sequence[Block], i: int, j: int, known: Container[tuple[int, int]]
+) -> bool:
+    """Whether block j, which was i, has targets near a neighbour that is not among the known pairs."""
     goal, new = timed.segments[j].goal, timed.blocks
     if goal is None or goal.empty:
         return False
-    asked = goal.asked.any(axis=(1, 2)) | goal.facing_asked
+    has_target = goal.mask.any(axis=(1, 2)) | goal.facing_mask
     head = max(old[i - 1].half if i else 0, new[j - 1].half if j else 0)
     changed = [(i - 1, j - 1) not in known or (i > 0 and old[i - 1].half != new[j - 1].half)]
     changed += [(i + 1, j + 1) not in known or (j + 1 < len(new) and old[i].half != new[j].half)]
-    ends = asked[:head], asked[-max(old[i].half, new[j].half) :]
+    ends = has_target[:head], has_target[-max(old[i].half, new[j].half) :]
     return any(change and end.any() for change, end in zip(changed, ends, strict=True))
 
 
-def _begins(blocks: Sequence[Block]) -> list[int]:
+def _first_frames(blocks: Sequence[Block]) -> list[int]:
     return [0, *accumulate(block.frames for block in blocks)]
 
 
@@ -210,7 +214,7 @@ def _margins(run: Run, old: Sequence[Block], new: Sequence[Block]) -> tuple[int,
     return lead, trail
 
 
-def _beside(old: Motion, at: _Stretch) -> Past:
+def _neighbouring_frames(old: Motion, at: _Stretch) -> Past:
     """The old frames on either side of what is sampled, as the network sees them."""
     before, behind = min(LOOK_BACK, at.first), min(LOOK_BACK, len(old) - 1 - at.end)
     known, comes = PlacedMotion.nothing(), None
@@ -224,68 +228,64 @@ def _beside(old: Motion, at: _Stretch) -> Past:
 # One run
 
 
-def _sampled(timed: Timed, old: Motion, run: Run, at: _Stretch, progress: Moves | None) -> Motion:
+def _sample_run(timed: Timed, old: Motion, run: Run, at: _Stretch, progress: Moves | None) -> Motion:
     """The old motion with one run sampled."""
-    past, prior, track = _beside(old, at), timed.prior, timed.track
+    past, prior, track = _neighbouring_frames(old, at), timed.prior, timed.track
     if track and not at.first:
         past = replace(past, end=track.place(0))
     segments = timed.segments[run.first : run.end]
-    asked, begin = [], at.first + at.lead
-    for segment in segments:
-        frames = round(segment.seconds * prior.fps)
-        asked.append(track.asked(segment, begin, frames) if track else segment)
-        begin += frames
-    if not asked:  # a seam: no block, but the words of what follows
+    run_segments = list(segments_on(track, segments, prior.fps, first=at.first + at.lead))
+    if not run_segments:  # a seam: no block, but the words of what follows
         near = timed.segments[min(run.first, len(timed.segments) - 1)]
-        asked = [replace(near, seconds=0.0, goal=None)]
+        run_segments = [replace(near, seconds=0.0, goal=None)]
     sampling = replace(timed.sampling, seed=timed.sampling.seeds(1)[0] + run.first, count=1, first=0)
     seconds = at.first / prior.fps
-    rows = long_features(prior, asked, past=past, begin=seconds, sampling=sampling, progress=progress)
+    rows = long_features(prior, run_segments, past=past, begin=seconds, sampling=sampling, progress=progress)
     whole = np.concatenate([*rows, *([] if past.behind is None else [past.behind[:1]])])
     lengths = [at.lead, *(block.frames for block in timed.blocks[run.first : run.end])]
     parts = np.split(whole, list(accumulate(lengths)))
     goals = [None, *(segment.goal for segment in segments), None]
     some = [(part, goal) for part, goal in zip(parts, goals, strict=True) if len(part)]
-    placed = in_world(prior, (part for part, _ in some), deque(goal for _, goal in some), past.end, track, at.first)
-    return _put_in(timed, old, at, past, reduce(strung, placed))
+    placed = place_pieces(prior, (part for part, _ in some), deque(goal for _, goal in some), past.end, track, at.first)
+    return _insert(timed, old, at, past, reduce(join_places, placed))
 
 
-def _put_in(timed: Timed, old: Motion, at: _Stretch, past: Past, made: Places) -> Motion:
+def _insert(timed: Timed, old: Motion, at: _Stretch, past: Past, sampled: Places) -> Motion:
     """The old motion with places in a stretch of it; they have a frame more where the old one goes on behind them."""
     before = [old.frames(0, at.first)] if at.first else []
     around = [part.frames(len(part) - len(past.known), len(part)) for part in before]
-    seen = [_as_they_are(part, past.known) for part in around]
+    stretches = [_known_places(part, past.known) for part in around]
     behind, beside = [old.frames(at.end, len(old))] if at.end < len(old) else [], []
     if past.behind is not None:
         if timed.track is None:
-            here, to = ground_pose(behind[0].frames(0, 1).positions()[0]), ground_pose(made.positions[-1])
-            behind = [carried_level(behind[0], here, to)]
-        made = made.crop(0, len(made) - 1)
+            here, to = ground_pose(behind[0].frames(0, 1).positions()[0]), ground_pose(sampled.positions[-1])
+            behind = [move_on_floor(behind[0], here, to)]
+        sampled = sampled.crop(0, len(sampled) - 1)
         beside = [behind[0].frames(0, len(past.behind))]
-    first, end = len(past.known), len(past.known) + len(made)
-    seen += [made, *(_as_they_are(part, past.behind) for part in beside)]
-    solved = _solved(timed, reduce(strung, seen), first, end)
-    held = concatenated(*around, solved.frames(first, end), *beside)
-    return concatenated(*before, splice(held, solved, first, last=end).frames(first, end), *behind)
+    first, end = len(past.known), len(past.known) + len(sampled)
+    stretches += [sampled, *(_known_places(part, past.behind) for part in beside)]
+    solved = _solve_body(timed, reduce(join_places, stretches), first, end)
+    held = concatenate(*around, solved.frames(first, end), *beside)
+    return concatenate(*before, splice(held, solved, first, last=end).frames(first, end), *behind)
 
 
-def _solved(timed: Timed, places: Places, first: int, end: int) -> Motion:
-    """A body in these places; a foot that is planted before ``first`` or behind ``end`` stands where it is there."""
+def _solve_body(timed: Timed, places: Places, first: int, end: int) -> Motion:
+    """A body in these places; a foot that is planted before ``first`` or behind ``end`` stays where it is there."""
     motion = motion_from_positions(places.positions, timed.prior.fps)
     if timed.foot_lock:
         for _ in range(2):  # what lies before, and then, backwards in time, what lies behind
             rest = [motion.frames(end, len(motion))] if end < len(motion) else []
             cleaned = clean_feet(motion.frames(0, end), contacts=places.contacts[:end], shown=first)
-            motion = _backwards(concatenated(cleaned, *rest))
+            motion = _time_reversed(concatenate(cleaned, *rest))
             places = Places(places.positions[::-1], places.contacts[::-1], places.goal)
             first, end = len(motion) - end, len(motion)
     return motion if places.goal.empty else fit(motion, places.goal)
 
 
-def _backwards(motion: Motion) -> Motion:
+def _time_reversed(motion: Motion) -> Motion:
     return replace(motion, root=motion.root[::-1].copy(), rotations=motion.rotations[::-1].copy())
 
 
-def _as_they_are(motion: Motion, known: np.ndarray | None) -> Places:
+def _known_places(motion: Motion, known: np.ndarray | None) -> Places:
     assert known is not None
     return Places(motion.positions(), known[:, LAYOUT["contacts"]].astype(np.float64), Goal.nothing(len(motion)))

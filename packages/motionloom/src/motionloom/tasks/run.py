@@ -1,4 +1,4 @@
-"""Every task by one function: `run` of a `Plan` gives results, one after the other, whichever door asked.
+"""Every task by one function: `run` of a `Plan` gives results, one after the other, whichever interface requested it.
 
 A door reads a request and what it names into a plan; `run` samples, puts the body together, and closes loops; the door
 writes. Motions that are sampled in one network call are a group: those of a group that is finished stay where the next
@@ -23,7 +23,7 @@ from motionloom.skeleton import SMPL22
 from motionloom.tasks import control, duet, edit, long, pair, predict, redraw, text, worded
 from motionloom.tasks.adapting import AdaptedPriors, adapt
 from motionloom.tasks.sampling import Moves, Progress
-from motionloom.tasks.splice import concatenated
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -43,7 +43,7 @@ class Models:
 
     @cached_property
     def prior(self) -> Prior:
-        """What makes one person of words."""
+        """The weights that generate one person from words."""
         if isinstance(self.weights, Prior):
             return self.weights
         return adapt(Prior.load(self.weights, device=self.device), self.adapters)
@@ -60,28 +60,28 @@ class Models:
 
     @cached_property
     def block(self) -> PairBlock:
-        """What makes two people of one prior."""
-        found = self.pair_weights
-        return found if isinstance(found, PairBlock) else PairBlock.load(found, self.prior)
+        """The block that generates two people with one prior."""
+        weights = self.pair_weights
+        return weights if isinstance(weights, PairBlock) else PairBlock.load(weights, self.prior)
 
     @cached_property
     def predictor(self) -> Predictor:
-        """What says what comes next."""
-        found = self.predictor_weights
-        return found if isinstance(found, Predictor) else Predictor.load(found, device=self.device)
+        """The weights that predict the next frames."""
+        weights = self.predictor_weights
+        return weights if isinstance(weights, Predictor) else Predictor.load(weights, device=self.device)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
-    """What is asked of a task, with all that the request names."""
+    """A request of a task, with all the motions and files that it names."""
 
     task: str
     values: Any
     """The task's request."""
     sampling: Any
-    """The request's `Sampling`, with what its timeline says."""
+    """The request's `Sampling`, with the seed and guidance of its timeline."""
     seconds: float = 0.0
-    """Length where no timeline, goal and motion says it."""
+    """Length where no timeline, goal or motion has one."""
     timeline: Timeline | None = None
     start: Motion | None = None
     """What the timeline goes on from."""
@@ -91,7 +91,7 @@ class Plan:
     """Networks that see the goals."""
     people: tuple[Motion, ...] = ()
     """The motion that is changed, gone on from or answered; all who are in it."""
-    kept: tuple[Motion, Sequence[redraw.Block]] | None = None
+    previous: tuple[Motion, Sequence[redraw.Block]] | None = None
     """A motion of an earlier timeline and what it was sampled from: blocks that ask for the same keep its frames."""
     target: Motion | None = None
     """What is switched to, on the skeleton and at the rate of the first of them; what an edit takes parts of."""
@@ -99,7 +99,7 @@ class Plan:
     taught: tuple[Applied, ...] = ()
     """Adapters of the prior for these motions, besides those that the models have."""
     in_pieces: bool = False
-    """Whether the one motion of a timeline is given piece by piece, as it is finished, and not made a loop."""
+    """Whether the one motion of a timeline comes piece by piece, as it is finished, and not as a loop."""
 
     @property
     def count(self) -> int:
@@ -108,7 +108,7 @@ class Plan:
 
     @property
     def prompt(self) -> str:
-        """What is said."""
+        """The words of the request."""
         return getattr(self.values, "prompt", None) or ""
 
 
@@ -123,7 +123,7 @@ class Result:
     remarks: list[str] = field(default_factory=list)
     """What was missed, a sentence each."""
     about: Any = None
-    """What the task says besides: `Worded` or `Controlled`."""
+    """The task's own result: `Worded` or `Controlled`."""
     blocks: Sequence[redraw.Block] = ()
     """What the blocks of a timeline were sampled from."""
 
@@ -131,19 +131,19 @@ class Result:
 def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) -> Iterator[Result]:
     """The motions of a plan as they are finished, loops closed; progress: network calls, or windows, done and in all.
 
-    Raises MotionloomError for what cannot be asked, as the functions of the tasks do.
+    Raises MotionloomError for an impossible request, as the functions of the tasks do.
     """
     models = models.adapted(plan.taught)
-    task, size = (_composed, plan.count) if at_once(plan) else _TASKS[plan.task]
+    task, size = (_compose, plan.count) if is_batched(plan) else _TASKS[plan.task]
     size = 1 if plan.timeline is not None and plan.task == "duet" else size
     own, first = plan.task in ("predict", "switch", "duet"), plan.sampling.first
     for begin in range(0, plan.count, size):
         some = min(size, plan.count - begin)
         group = replace(plan, sampling=replace(plan.sampling, first=first + begin, count=some))
-        moved = _Moved(progress, begin, some, plan.count)
+        moved = _GroupProgress(progress, begin, some, plan.count)
         for number, result in enumerate(task(group, models, moved), start=first + begin):
             seed = plan.sampling.seed + (0 if own else number)
-            yield closed(plan, models, replace(result, number=number, seed=seed))
+            yield close_loop(plan, models, replace(result, number=number, seed=seed))
 
 
 def run_each(
@@ -156,17 +156,17 @@ def run_each(
     matrix products.
     """
     models = models.adapted(plans[0].taught)
-    for index, result in _each(plans, models, progress):
-        yield index, closed(plans[index], models, result)
+    for index, result in _run_rows(plans, models, progress):
+        yield index, close_loop(plans[index], models, result)
 
 
-def at_once(plan: Any) -> bool:
+def is_batched(plan: Any) -> bool:
     """Whether the motions of a plan are sampled in the same network calls, rather than one after the other."""
     return plan.task != "duet" and plan.timeline is not None and not plan.timeline.readings
 
 
 @dataclass(frozen=True)
-class _Moved:
+class _GroupProgress:
     """Reports how far the whole is by how far a group is."""
 
     progress: Progress
@@ -178,23 +178,23 @@ class _Moved:
         self.progress(self.begin * of + self.some * done, self.count * of)
 
 
-def closed(plan: Any, models: Models, result: Result) -> Result:
+def close_loop(plan: Any, models: Models, result: Result) -> Result:
     """The motion as a loop, where the request says so; an edit makes its own."""
     values = plan.values
     if plan.task == "edit" or plan.in_pieces or not getattr(values, "loop", False):
         return result
-    said = plan.timeline.segments[-1].text if plan.timeline else plan.prompt
-    said = "" if plan.task == "duet" else said
-    settings: dict[str, Any] = {"guidance": plan.sampling.guidance} if said else {}
+    prompt = plan.timeline.segments[-1].text if plan.timeline else plan.prompt
+    prompt = "" if plan.task == "duet" else prompt
+    settings: dict[str, Any] = {"guidance": plan.sampling.guidance} if prompt else {}
     settings |= {} if plan.task in ("predict", "switch") else {"steps": plan.sampling.steps}
     how = {"blend": values.blend, "foot_lock": values.foot_lock, "seed": plan.sampling.seed + result.number}
     with watching(lambda denoised: None):  # what is watched are the motions
-        people = tuple(edit.close(models.prior, one, said, **how, **settings) for one in result.people)
+        people = tuple(edit.close(models.prior, one, prompt, **how, **settings) for one in result.people)
     return replace(result, people=people)
 
 
-def moves(progress: Progress, steps: int, rows: int) -> Moves:
-    """What a chain of ``rows`` says of its moves, as progress."""
+def chain_progress(progress: Progress, steps: int, rows: int) -> Moves:
+    """A callback for the moves of a chain of ``rows`` that reports them as progress."""
     done = 0
 
     def moved(more: int) -> None:
@@ -208,82 +208,88 @@ def moves(progress: Progress, steps: int, rows: int) -> Moves:
 # Each task: results of a group, without their numbers and seeds
 
 
-def _composed(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     assert plan.timeline is not None
-    segments, lock = long.with_loaded(models.prior, plan.timeline.segments), plan.values.foot_lock
+    segments, lock = long.load_segment_adapters(models.prior, plan.timeline.segments), plan.values.foot_lock
     takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]
-    if plan.kept is not None and plan.count == 1 and (runs := redraw.runs_of(plan.kept[1], takes[0])) is not None:
-        moved = moves(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))
-        motion = redraw.redrawn(takes[0], *plan.kept, runs, moved)
+    if (
+        plan.previous is not None
+        and plan.count == 1
+        and (runs := redraw.changed_runs(plan.previous[1], takes[0])) is not None
+    ):
+        moved = chain_progress(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))
+        motion = redraw.resample_runs(takes[0], *plan.previous, runs, moved)
         measures = {"redrawn": [block for run in runs for block in range(run.first, run.end)]}
         return iter([Result((motion,), measures=measures, blocks=takes[0].blocks)])
-    made = (long.compose if plan.in_pieces else long.compose_takes)(
+    motions = (long.compose if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
         start=plan.start,
         path=plan.timeline.path,
         foot_lock=lock,
         sampling=plan.sampling,
-        progress=moves(progress, plan.sampling.steps, plan.count * len(segments)),
+        progress=chain_progress(progress, plan.sampling.steps, plan.count * len(segments)),
     )
     if plan.in_pieces:
-        return (Result((piece,)) for piece in made)
-    return (Result((motion,), blocks=timed.blocks) for timed, motion in zip(takes, made, strict=True))
+        return (Result((piece,)) for piece in motions)
+    return (Result((motion,), blocks=timed.blocks) for timed, motion in zip(takes, motions, strict=True))
 
 
-def _one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
-    return (result for _, result in _each([plan], models, progress))
+def _run_one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+    return (result for _, result in _run_rows([plan], models, progress))
 
 
-def _each(plans: Sequence[Plan], models: Models, progress: Progress) -> Iterator[tuple[int, Result]]:
+def _run_rows(plans: Sequence[Plan], models: Models, progress: Progress) -> Iterator[tuple[int, Result]]:
     first, prior = plans[0], models.prior
     rows = [(index, number) for index, plan in enumerate(plans) for number in plan.sampling.numbers()]
     prompts, seeds = [plans[i].prompt for i, _ in rows], [plans[i].sampling.seed + number for i, number in rows]
     how: dict[str, Any] = {"seeds": seeds, "sampling": first.sampling, "progress": progress}
-    made: Iterable[Result]
+    results: Iterable[Result]
     if first.task == "control":
         goal, _ = first.goals
         assert goal is not None
         own: dict[str, Any] = {"adapters": first.adapters, "fit": first.values.fit}
         own["foot_lock"] = first.values.foot_lock
-        made = map(_controlled, control.control_each(prior, prompts, goal, **own, **how))
+        results = map(_control_result, control.control_each(prior, prompts, goal, **own, **how))
     elif first.timeline is not None:
         timelines = [plans[i].timeline or first.timeline for i, _ in rows]
-        made = map(_worded, worded.draw(prior, timelines, foot_lock=first.values.foot_lock, **how))
+        results = map(
+            _worded_result, worded.generate_timelines(prior, timelines, foot_lock=first.values.foot_lock, **how)
+        )
     else:
         frames = [text.frames_in(plans[i].seconds, prior.fps) for i, _ in rows]
         features = text.sample_features(prior, prompts, frames, padded=True, **how)
-        made = (Result((text.finish(prior, one, foot_lock=first.values.foot_lock),)) for one in features)
-    for (index, number), seed, result in zip(rows, seeds, made, strict=True):
+        results = (Result((text.finish(prior, one, foot_lock=first.values.foot_lock),)) for one in features)
+    for (index, number), seed, result in zip(rows, seeds, results, strict=True):
         yield index, replace(result, number=number, seed=seed)
 
 
-def _worded(made: worded.Worded) -> Result:
-    amounts = [asdict(amount) for amount in made.amounts]
-    return Result((made.motion,), measures={"amounts": amounts}, remarks=made.shortfalls, about=made)
+def _worded_result(one: worded.Worded) -> Result:
+    amounts = [asdict(amount) for amount in one.amounts]
+    return Result((one.motion,), measures={"amounts": amounts}, remarks=one.shortfalls, about=one)
 
 
-def _controlled(made: control.Controlled) -> Result:
-    missed = list(made.missed)
-    return Result((made.motion,), measures={"missed": missed}, remarks=missed, about=made)
+def _control_result(one: control.Controlled) -> Result:
+    missed = list(one.missed)
+    return Result((one.motion,), measures={"missed": missed}, remarks=missed, about=one)
 
 
-def _edited(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
+def _edit(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     values, people = plan.values, list(plan.people)
     names = ("keep", "between", "loop", "blend", "extend", "strength", "smooth")
-    own, given = people[values.person], {name: getattr(values, name) for name in names}
+    own, options = people[values.person], {name: getattr(values, name) for name in names}
     look = None if values.look is None else np.asarray(values.look)
     if values.look_at is not None:
         look = joints22(people[values.look_at])[:, SMPL22.index("head")]
-    changes = edit.changes_asked(plan.prompt, source=plan.target, look=look, **given)
+    changes = edit.changes_from_options(plan.prompt, source=plan.target, look=look, **options)
     how = {"foot_lock": values.foot_lock, "sampling": plan.sampling, "progress": progress}
     for motion in edit.edit(models.prior, own, plan.prompt, changes, **how):
         people[values.person] = motion
         yield Result(tuple(people) if len(motion) == len(own) else (motion,))
 
 
-def _predicted(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
-    made = predict.predict(
+def _predict(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
+    futures = predict.predict(
         models.predictor,
         plan.people[0],
         seconds=plan.values.seconds,
@@ -293,12 +299,12 @@ def _predicted(plan: Plan, models: Models, progress: Progress) -> Iterable[Resul
         sampling=plan.sampling,
         progress=progress,
     )
-    return [Result((motion,)) for motion in made]
+    return [Result((motion,)) for motion in futures]
 
 
-def _switched(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
+def _switch(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
     assert plan.target is not None
-    made = predict.switch(
+    motions = predict.switch(
         models.predictor,
         plan.people[0],
         plan.target,
@@ -307,41 +313,41 @@ def _switched(plan: Plan, models: Models, progress: Progress) -> Iterable[Result
         foot_lock=plan.values.foot_lock,
         sampling=plan.sampling,
     )
-    return [Result((motion,)) for motion in made]
+    return [Result((motion,)) for motion in motions]
 
 
 def _duet(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
     values, prior, block = plan.values, models.prior, models.block
     how: dict[str, Any] = {"sampling": plan.sampling, "foot_lock": values.foot_lock}
     if plan.timeline is not None:
-        segments = long.with_loaded(prior, plan.timeline.segments)
-        moved = moves(progress, plan.sampling.steps, len(segments))
+        segments = long.load_segment_adapters(prior, plan.timeline.segments)
+        moved = chain_progress(progress, plan.sampling.steps, len(segments))
         person = values.person
         paths = {"path": plan.timeline.path, "person": person, "other": plan.goals[1 - person]}
         blocks = duet.compose_pair(prior, block, segments, **paths, progress=moved, **how)
-        made = [tuple(concatenated(*one) for one in zip(*blocks, strict=True))]
+        duets = [tuple(concatenate(*one) for one in zip(*blocks, strict=True))]
     elif len(plan.people) == 2:
         first, second = plan.people
-        made = pair.complete_pair(
+        duets = pair.complete_pair(
             prior, block, (first, second), plan.prompt, seconds=plan.seconds, progress=progress, **how
         )
     elif plan.people:
-        made = duet.react(prior, block, plan.people[0], plan.prompt, progress=progress, **how)
+        duets = duet.react(prior, block, plan.people[0], plan.prompt, progress=progress, **how)
     else:
-        made = pair.generate_pair(
+        duets = pair.generate_pair(
             prior, block, plan.prompt, seconds=plan.seconds, goals=plan.goals, progress=progress, **how
         )
-    return [Result(tuple(two)) for two in made]
+    return [Result(tuple(two)) for two in duets]
 
 
 _Task = Callable[[Plan, Models, Progress], Iterable[Result]]
 ALL = 10_000
 _TASKS: dict[str, tuple[_Task, int]] = {
-    "generate": (_one, ALL),
-    "control": (_one, BATCH),
-    "edit": (_edited, 1),
-    "predict": (_predicted, 16),
-    "switch": (_switched, 16),
+    "generate": (_run_one, ALL),
+    "control": (_run_one, BATCH),
+    "edit": (_edit, 1),
+    "predict": (_predict, 16),
+    "switch": (_switch, 16),
     "duet": (_duet, pair.PAIRS),
 }
-"""What makes the motions of each, and how many of them are made together."""
+"""The function of each task, and how many motions it samples together."""

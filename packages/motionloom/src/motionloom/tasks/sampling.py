@@ -29,8 +29,8 @@ from motionloom.requests.sampling import Sampling
 from motionloom.runtime.pair import PairSession
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
-from motionloom.tasks.best import best, seeds_tried
-from motionloom.tasks.watching import ChainView, Latest, View
+from motionloom.tasks.best import best_candidate, candidate_seeds
+from motionloom.tasks.watching import ChainView, LatestEstimates, View
 from motionloom.weights.prior import Prior
 
 Progress = Callable[[int, int], None]
@@ -41,7 +41,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What is asked of each row of a batch: one entry per row."""
+    """Prompt, length and seed of each row of a batch: one entry per row."""
 
     prompts: Sequence[str]
     """An empty one asks for nothing in particular."""
@@ -83,14 +83,14 @@ Edit: TypeAlias = Callable[[Denoiser, Batch], Denoiser]
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Part of the states that is given (inpainting)."""
+    """Known part of the states (inpainting)."""
 
     values: np.ndarray
     """(rows, tokens, features), standardised; read where the mask is True."""
     mask: np.ndarray
     """The same shape, bool."""
     noise_free: bool = False
-    """The network sees what is given without noise (Shafir et al. 2024, section 3.3), else at the noise of its level
+    """The network sees the known part without noise (Shafir et al. 2024, section 3.3), else at the noise of its level
     (RePaint, Lugmayr et al. 2022)."""
     strength: float = 1.0
     """Share of the noise levels that the values are taken to, and sampled back from (SDEdit, Meng et al. 2022)."""
@@ -118,7 +118,7 @@ def sample(
 
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. guided: the guided
     denoiser of all rows, where it is not that of the network alone. edits: of each
-    batch's guided denoiser, after what is observed was put in, the first one first. halfway: stop after half of the
+    batch's guided denoiser, after the observed part is inserted, the first one first. halfway: stop after half of the
     calls and give the denoised estimates. corrected: rows of one length are given `Prior.smoothed`, with what is
     observed in its place, and through the edits once more, at level 0. view: how each network call is seen by who is
     `watching`; None: nobody can.
@@ -129,7 +129,7 @@ def sample(
     way = sampling.levels(prior.schedule, observed.strength if observed else 1.0)
     if sampling.best_of > 1 and not halfway:
         people, calls = view.people if view else 1, len(rows.batches(sampling.batch())) * (len(way) - 1)
-        choosing, progress = _in_turn(progress, of=calls)
+        choosing, progress = _split_progress(progress, of=calls)
         rows = with_best_seeds(
             prior, rows, sampling, network=net, edits=edits, observed=observed, people=people, progress=choosing
         )
@@ -143,13 +143,13 @@ def sample(
         batch = Batch(numbers, cond, [rows.seeds[i] for i in numbers])
         noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
         base = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.guidance)
-        denoise, constrain = _at_noise(base), None
+        denoise, constrain = _identity_when_clean(base), None
         if observed is None:
             state = noise(np.empty((len(numbers), max(lengths), len(prior.mean)), np.float32))
         else:
             here = observed.of(numbers)
             denoise = inpaint(denoise, here.values, here.mask)
-            state, constrain = _begun(prior, here, way[0], noise)
+            state, constrain = _initial_state(prior, here, way[0], noise)
         for edit in edits:
             denoise = edit(denoise, batch)
         walk = denoising(
@@ -161,7 +161,7 @@ def sample(
             noise=noise,
             constrain=constrain,
         )
-        for snapshot in view.reported(walk, len(way) - 1, numbers) if view else walk:
+        for snapshot in view.report_walk(walk, len(way) - 1, numbers) if view else walk:
             state, done = snapshot.clean if halfway else snapshot.state, done + 1
             if progress:
                 progress(done, len(batches) * (len(way) - 1))
@@ -171,12 +171,12 @@ def sample(
         yield from ((number, one[:length]) for number, one, length in zip(numbers, state, lengths, strict=True))
 
 
-def _at_noise(denoise: Denoiser) -> Denoiser:
+def _identity_when_clean(denoise: Denoiser) -> Denoiser:
     """The denoiser, for which a clean state is its own estimate."""
     return lambda state, level: denoise(state, level) if level else state
 
 
-def _begun(prior: Prior, observed: Observed, level: int, noise: NoiseSource) -> tuple[State, Constraint]:
+def _initial_state(prior: Prior, observed: Observed, level: int, noise: NoiseSource) -> tuple[State, Constraint]:
     """The state at the first level, and what keeps it to what is observed."""
     hold = observe(observed.values, observed.mask, prior.schedule, np.zeros_like if observed.noise_free else noise)
     whole = observed.strength == 1.0
@@ -202,38 +202,40 @@ def with_best_seeds(
     """
     count, motions = sampling.best_of, range(0, len(rows.seeds), people)
     of = [row for first in motions for _ in range(count) for row in range(first, first + people)]
-    tried = [seeds_tried(seed, count) for seed in rows.seeds]
-    seeds = [tried[row][place // people % count] for place, row in enumerate(of)]
+    seeds_of_rows = [candidate_seeds(seed, count) for seed in rows.seeds]
+    seeds = [seeds_of_rows[row][place // people % count] for place, row in enumerate(of)]
     several = replace(
         rows, prompts=[rows.prompts[row] for row in of], lengths=[rows.lengths[row] for row in of], seeds=seeds
     )
-    made = sample(
+    candidates = sample(
         prior,
         several,
         sampling,
         network=network,
-        edits=[_on_candidates(edit, of) for edit in edits],
+        edits=[_edit_of_candidates(edit, of) for edit in edits],
         observed=observed and observed.of(of),
         halfway=True,
         progress=progress,
     )
-    estimates, chosen = dict(made), list(rows.seeds)
+    estimates, chosen = dict(candidates), list(rows.seeds)
     level = sampling.levels(prior.schedule)[0]
     for first in motions:
         own = range(first, first + people)
         states = np.stack([estimates[first * count + place] for place in range(count * people)])
         states = states.reshape(count, people, *states.shape[1:])[:, :, rows.slots :]
-        number = best(prior, [rows.prompts[row] for row in own], states, seeds=tried[first], level=level)
-        chosen[first : first + people] = [tried[row][number] for row in own]
+        number = best_candidate(
+            prior, [rows.prompts[row] for row in own], states, seeds=seeds_of_rows[first], level=level
+        )
+        chosen[first : first + people] = [seeds_of_rows[row][number] for row in own]
     return replace(rows, seeds=chosen)
 
 
-def _on_candidates(edit: Edit, of: Sequence[int]) -> Edit:
-    """The edit of rows for candidates, of which ``of`` says whose they are."""
+def _edit_of_candidates(edit: Edit, of: Sequence[int]) -> Edit:
+    """The edit of rows for candidates; ``of``: the row of each candidate."""
     return lambda denoise, batch: edit(denoise, replace(batch, rows=[of[i] for i in batch.rows], trial=True))
 
 
-def _in_turn(progress: Progress | None, *, of: int) -> tuple[Progress | None, Progress | None]:
+def _split_progress(progress: Progress | None, *, of: int) -> tuple[Progress | None, Progress | None]:
     """What two parts of a job report to, the second of ``of`` calls, so that ``progress`` sees one job."""
     if progress is None:
         return None, None
@@ -279,7 +281,7 @@ class ChainRow(Protocol):
 
 R = TypeVar("R", bound=ChainRow)
 Moves = Callable[[int], None]
-"""Called with how many more row moves were made; a row takes as many as there are steps."""
+"""Called with the number of further row moves; a row takes as many as there are steps."""
 
 
 def sample_chain(
@@ -303,13 +305,13 @@ def sample_chain(
     way, [first] = sampling.levels(prior.schedule), sampling.seeds(1)
     waiting: dict[int, R] = {}
     moved = progress or (lambda count: None)
-    seen = Latest(view, len(way) - 1)
+    latest = LatestEstimates(view, len(way) - 1)
 
     def links() -> Iterator[Link]:
         for number, row in enumerate(rows):
             waiting[number] = row
             motion, own = divmod(number, view.each) if view.each else (0, number)
-            seeds = seeds_tried(first + motion + own, sampling.best_of)
+            seeds = candidate_seeds(first + motion + own, sampling.best_of)
             yield Link(row.length, row.overlap, best_seed(row, seeds))
 
     def best_seed(row: R, seeds: list[int]) -> int:
@@ -329,15 +331,15 @@ def sample_chain(
             states = list(snapshot.clean)
             moved(0)
         motions = np.stack([row.motions(state) for state in states])
-        return seeds[best(prior, row.texts, motions, seeds=seeds, level=way[0])]
+        return seeds[best_candidate(prior, row.texts, motions, seeds=seeds, level=way[0])]
 
     def reported(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         some = [waiting[number] for number in numbers]
         denoised = denoise(some, states, at)
-        seen.report(numbers, some, denoised, at)
+        latest.report(numbers, some, denoised, at)
         return denoised
 
-    made = staggered(
+    states_of_rows = staggered(
         links(),
         reported,
         levels=way,
@@ -347,5 +349,5 @@ def sample_chain(
         batch_size=sampling.batch(batch_size),
         moved=moved,
     )
-    for number, state in enumerate(made):
+    for number, state in enumerate(states_of_rows):
         yield waiting.pop(number), state

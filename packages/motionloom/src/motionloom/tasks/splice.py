@@ -1,4 +1,4 @@
-"""Putting a sampled stretch into a user's own motion: their skeleton, their frame rate, no jump at the borders.
+"""A sampled stretch in a user's own motion: their skeleton, their frame rate, no jump at the borders.
 
 What lies outside of the stretch is never touched. Inside, the sampled motion is moved by what it lacks at the borders,
 in place and in velocity; that fades over a few frames ("inertialization", Bollo, GDC 2018, with a cubic).
@@ -32,7 +32,7 @@ EASE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class KeptParts:
     """Parts of a skeleton that stay inside of a stretch."""
 
     joints: Flags
@@ -41,7 +41,7 @@ class Kept:
     """(3,) which coordinates of the root stay."""
 
 
-def kept_parts(skeleton: Skeleton, joints: frozenset[int] = frozenset(), place: Flags | None = None) -> Kept:
+def kept_parts(skeleton: Skeleton, joints: frozenset[int] = frozenset(), place: Flags | None = None) -> KeptParts:
     """The skeleton's own joints for some of the 22; joints that correspond to none of them (fingers) always stay.
 
     place: (3,) which coordinates of the root stay; None: none.
@@ -56,7 +56,7 @@ def kept_parts(skeleton: Skeleton, joints: frozenset[int] = frozenset(), place: 
     for k in sorted(inner):
         above = flags[skeleton.parents[k]] if k else 0 in joints
         flags[k] = first[k] in joints if k in first else above
-    return Kept(flags, (np.zeros(3, dtype=bool) if place is None else place) | (0 in joints))
+    return KeptParts(flags, (np.zeros(3, dtype=bool) if place is None else place) | (0 in joints))
 
 
 def person_at_20(motion: Motion) -> Array:
@@ -93,17 +93,17 @@ def apply_positions(
     return onto(clean_feet(person, contacts=contacts) if foot_lock else person, old, known=known)
 
 
-def splice(old: Motion, made: Motion, first: int, *, last: int | None = None, kept: Kept | None = None) -> Motion:
-    """``old`` with the frames ``first`` to before ``last`` (the end) of ``made`` in it.
+def splice(old: Motion, new: Motion, first: int, *, last: int | None = None, kept: KeptParts | None = None) -> Motion:
+    """``old`` with the frames ``first`` to before ``last`` (the end) of ``new`` in it.
 
     Args:
-        old, made: of one skeleton, frame rate and length, and both with or both without moving bones.
+        old, new: of one skeleton, frame rate and length, and both with or both without moving bones.
         first, last: frames outside are the old ones bit for bit.
         kept: parts that are the old ones inside too; None: only joints that correspond to none of the 22.
     """
     last, kept = len(old) if last is None else last, kept or kept_parts(old.skeleton)
     ease = min(max(2, round(min(EASE * old.fps, (last - first) / 2))), last - first)
-    turns = made.rotations
+    turns = new.rotations
     for border, step in ((first - 1, 1), (last, -1)):
         if 0 <= border < len(old):
             turns = match_rotations(turns, old.rotations, border, step, ease)
@@ -111,12 +111,12 @@ def splice(old: Motion, made: Motion, first: int, *, last: int | None = None, ke
     turns = np.where(kept.joints[:, None], old.rotations, turns)
     rotations, place = old.rotations.copy(), place_of(old).copy()
     rotations[inside] = rot.unroll(np.concatenate([old.rotations[before : before + 1], turns[inside]]))[1:]
-    way = _eased_places(place, place_of(made), first, last, ease)
+    way = _eased_places(place, place_of(new), first, last, ease)
     place[inside] = np.where(kept.place, place, way)[inside]
     return with_place(replace(old, rotations=rotations), place)
 
 
-def continued(tail: Motion, places: Array, *, foot_lock: bool, contacts: Array | None = None) -> Motion:
+def continue_motion(tail: Motion, places: Array, *, foot_lock: bool, contacts: Array | None = None) -> Motion:
     """What comes behind a motion, on its skeleton and over its floor, without a jump.
 
     Args:
@@ -128,12 +128,12 @@ def continued(tail: Motion, places: Array, *, foot_lock: bool, contacts: Array |
     Returns:
         The frames behind the tail.
     """
-    old = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * (len(places) - len(tail)))
-    made = apply_positions(places, old, contacts=contacts, foot_lock=foot_lock, known=len(tail))
-    return splice(old, made, len(tail)).frames(len(tail), len(old))
+    old = concatenate(tail, *[tail.frames(len(tail) - 1, len(tail))] * (len(places) - len(tail)))
+    solved = apply_positions(places, old, contacts=contacts, foot_lock=foot_lock, known=len(tail))
+    return splice(old, solved, len(tail)).frames(len(tail), len(old))
 
 
-def overlaid(motion: Motion, source: Motion, joints: Array, place: Array) -> Motion:
+def overlay(motion: Motion, source: Motion, joints: Array, place: Array) -> Motion:
     """``motion`` with parts of another one of the same skeleton, rate and length: exactly its own where a weight is 1.
 
     ``joints`` (frames, joints) weigh the local rotations, ``place`` (frames,) what carries the way through the world.
@@ -145,29 +145,29 @@ def overlaid(motion: Motion, source: Motion, joints: Array, place: Array) -> Mot
     return with_place(replace(motion, rotations=turns), way)
 
 
-def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
+def move_rigidly(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
     """The motion turned by a quaternion (4,) about a point and moved so that the point comes to another (3,)."""
     rotations = motion.rotations.copy()
     rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
     return replace(motion, root=rot.rotate(turn, motion.root - about) + to, rotations=rotations)
 
 
-def carried_level(motion: Motion, here: GroundPose, there: GroundPose) -> Motion:
+def move_on_floor(motion: Motion, here: GroundPose, there: GroundPose) -> Motion:
     """The motion moved along the floor so that one ground pose becomes another, the path carried by the same joint as
     before (`match_root`)."""
     turn = rot.rotvec_to_quat(np.array([0.0, there.facing - here.facing, 0.0]))
     about, to = np.array([here.x, 0.0, here.z]), np.array([there.x, 0.0, there.z])
-    return match_root(motion, carried(motion, turn, about, to))
+    return match_root(motion, move_rigidly(motion, turn, about, to))
 
 
-def standing(motion: Motion, frame: int) -> GroundPose:
+def ground_pose_at(motion: Motion, frame: int) -> GroundPose:
     """The ground pose of the hips in a frame."""
     places = joints22(motion.frames(frame, frame + 1))[0]
     across = places[1] - places[2]
     return GroundPose.of((places[1] + places[2]) / 2, float(np.arctan2(-across[2], across[0])))
 
 
-def concatenated(*parts: Motion) -> Motion:
+def concatenate(*parts: Motion) -> Motion:
     """One motion after the other; all on the first one's skeleton and at its rate."""
     moved = None if parts[0].translations is None else [p.translations for p in parts if p.translations is not None]
     return replace(
@@ -178,15 +178,15 @@ def concatenated(*parts: Motion) -> Motion:
     )
 
 
-def _eased_places(old: Array, made: Array, first: int, last: int, ease: int) -> Array:
-    """``made`` (frames, 3) with what it lacks at the borders; what they lack differently spreads over the stretch."""
-    lack, frames = old - made, len(old)
+def _eased_places(old: Array, new: Array, first: int, last: int, ease: int) -> Array:
+    """``new`` (frames, 3) with what it lacks at the borders; what they lack differently spreads over the stretch."""
+    lack, frames = old - new, len(old)
     before, behind = first > 0, last < frames
     level = np.array([1.0, 0.0, 1.0])  # with one border only, the other end is at the height that was sampled
     left = lack[first - 1] if before else level * lack[last] if behind else np.zeros(3)
     right = lack[last] if behind else level * left
     u = ((np.arange(frames) - first + 1) / (last - first + 1))[:, None]
-    result = made + left + smoothstep(u) * (right - left)
+    result = new + left + smoothstep(u) * (right - left)
     for border, step, there in ((first - 1, 1, before), (last, -1, behind)):
         if there and 0 <= border - step < frames:
             slope = lack[border] - lack[border - step]

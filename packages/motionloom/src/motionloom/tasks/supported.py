@@ -20,7 +20,7 @@ REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
 """Metres over the floor where the joint of a hand, and of the head, comes to lie."""
 
 
-def supported(motion: Motion) -> Motion:
+def add_support(motion: Motion) -> Motion:
     """The motion with its feet on steps of one height where it climbs, on the floor where it hovers, its hands above.
 
     motion: of the 22-joint person at 20 frames per second, on the floor y = 0.
@@ -32,8 +32,8 @@ def supported(motion: Motion) -> Motion:
     for joint, rest in REST.items():
         sunk = places[:, joint, 1] < rest - SUNK
         goal.positions[sunk, joint, 1] = rest
-        goal.asked[sunk, joint, 1] = True
-    return fit(motion, goal) if goal.asked.any() else motion
+        goal.mask[sunk, joint, 1] = True
+    return fit(motion, goal) if goal.mask.any() else motion
 
 
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
@@ -46,7 +46,7 @@ def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
         ankle, frames = ANKLES[hold.side], slice(hold.first, hold.end)
         off = level * found.rise - hold.height
         goal.positions[frames, ankle] = np.median(places[frames, ankle], axis=0) + np.array([0.0, off, 0.0])
-        goal.asked[frames, ankle] = True
+        goal.mask[frames, ankle] = True
         lift[frames], known[frames] = off, True
     at = np.arange(len(motion))
     lift = smooth(np.interp(at, at[known], lift[known]), odd(motion.fps / 2))

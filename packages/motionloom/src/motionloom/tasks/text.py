@@ -11,7 +11,8 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features import babel, humanml
-from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
@@ -23,7 +24,7 @@ from motionloom.requests.sampling import SPACING as SPACING
 from motionloom.requests.sampling import STEPS as STEPS
 from motionloom.requests.shared import LONGEST
 from motionloom.tasks.sampling import Progress, Rows, sample
-from motionloom.tasks.supported import supported
+from motionloom.tasks.supported import add_support
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
@@ -50,21 +51,21 @@ def sample_features(
         progress: called after each network call.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
     """
     rows = Rows(prompts, frames, seeds, patch=prior.net.config.patch if padded else 1)
-    made = dict(_sampled(prior, rows, Sampling.of(sampling, settings), progress))
-    return [made[row] for row in range(len(prompts))]
+    states = dict(_sample_motions(prior, rows, Sampling.of(sampling, settings), progress))
+    return [states[row] for row in range(len(prompts))]
 
 
-def _sampled(
+def _sample_motions(
     prior: Prior, rows: Rows, sampling: Sampling, progress: Progress | None
 ) -> Iterator[tuple[int, np.ndarray]]:
     """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
     check_prompts(rows.prompts)
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in rows.seeds):
         raise MotionloomError(f"seed must be {specs(Sampling)['seed'].range}; got {min(rows.seeds)}")
-    for row, state in sample(prior, rows, sampling, progress=progress, view=alone(prior)):
+    for row, state in sample(prior, rows, sampling, progress=progress, view=single_person_view(prior)):
         yield row, prior.to_features(state)
 
 
@@ -98,11 +99,11 @@ def generate(
         Motions of the 22-joint person, who starts near the origin facing +Z.
 
     Raises:
-        MotionloomError: for what cannot be asked.
+        MotionloomError: for an impossible request.
     """
-    from motionloom.tasks.worded import generate_worded  # which draws with what is here
+    from motionloom.tasks.worded import generate_worded  # which imports this module
 
-    made = generate_worded(
+    results = generate_worded(
         prior,
         prompts,
         seconds=seconds,
@@ -112,7 +113,7 @@ def generate(
         progress=progress,
         **settings,
     )
-    return [one.motion for one in made]
+    return [one.motion for one in results]
 
 
 def generate_each(
@@ -131,16 +132,16 @@ def generate_each(
     """
     check_features(prior)
     frames = [frames_in(length, prior.fps) for length in seconds]
-    for row, features in _sampled(prior, Rows(prompts, frames, seeds), sampling, progress):
+    for row, features in _sample_motions(prior, Rows(prompts, frames, seeds), sampling, progress):
         yield row, finish(prior, features, foot_lock=foot_lock)
 
 
-def alone(prior: Prior) -> View:
+def single_person_view(prior: Prior) -> View:
     """One person to a row, as the network predicted them."""
-    return View(lambda states: places_of(prior, states)[:, None])
+    return View(lambda states: joint_positions(prior, states)[:, None])
 
 
-def places_of(prior: Prior, states: np.ndarray) -> np.ndarray:
+def joint_positions(prior: Prior, states: np.ndarray) -> np.ndarray:
     """(rows, frames, 22, 3) metres of standardised states (rows, frames, numbers); bones may breathe."""
     features = prior.to_features(states)
     if features.shape[-1] == WIDTH:
@@ -163,6 +164,19 @@ def check_features(prior: Prior) -> None:
         )
 
 
+def check_humanml(prior: Prior, subject: str) -> None:
+    """Raise MotionloomError unless the weights make HumanML3D's numbers; ``subject``: who needs them, "edits need"."""
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(f"these weights make {len(prior.mean)} numbers a frame; {subject} {WIDTH} at {FPS:g} fps")
+
+
+def check_goal_length(goal: Goal, fps: float) -> None:
+    """Raise MotionloomError for a goal of fewer than 4 frames or of more than `LONGEST` seconds."""
+    longest = round(LONGEST * fps)
+    if not 4 <= len(goal) <= longest:
+        raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
+
+
 def finish(prior: Prior, features: np.ndarray, *, foot_lock: bool = True) -> Motion:
     """Features (frames, numbers) of this prior, not standardised, to a motion at its frame rate.
 
@@ -176,7 +190,7 @@ def finish(prior: Prior, features: np.ndarray, *, foot_lock: bool = True) -> Mot
 
 def _from_humanml(features: np.ndarray, fps: float, foot_lock: bool) -> Motion:
     motion = to_motion(features, fps, foot_lock=foot_lock)
-    return supported(motion) if foot_lock else motion
+    return add_support(motion) if foot_lock else motion
 
 
 def _from_babel(features: np.ndarray, fps: float, foot_lock: bool) -> Motion:

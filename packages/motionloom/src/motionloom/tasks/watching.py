@@ -8,7 +8,7 @@
 
 Whatever samples (every function of `motionloom.tasks`) reports to the callback of the `watching` block that it runs in.
 The poses are decoded only where `Denoised.positions` is called, so watching costs nothing unless one looks. An
-exception that the callback raises ends the drawing: that is how a motion is cancelled between two network calls.
+exception that the callback raises ends the sampling: that is how a motion is cancelled between two network calls.
 """
 
 from collections import Counter
@@ -31,7 +31,7 @@ class Denoised:
     """What one network call predicted."""
 
     done: int
-    """Moves made of this walk, from 1."""
+    """Moves of this walk so far, from 1."""
     of: int
     """Moves of the walk; an edit of several stretches, or a batch of several lengths, takes several walks."""
     rows: tuple[int, ...]
@@ -80,7 +80,7 @@ class View:
     begin: float = 0.0
     """As of `Denoised`."""
 
-    def reported(self, walk: Iterator[Snapshot], of: int, rows: Sequence[int]) -> Iterator[Snapshot]:
+    def report_walk(self, walk: Iterator[Snapshot], of: int, rows: Sequence[int]) -> Iterator[Snapshot]:
         """The snapshots of a walk of ``of`` moves, each reported before it is handed on; rows: their numbers."""
         motions = [row // self.people for row in rows[:: self.people]]
         for done, snapshot in enumerate(walk, start=1):
@@ -103,19 +103,19 @@ class ChainView(Generic[R]):
     """How the rows of a chain make long motions, and how these are looked at while rows are at different levels."""
 
     part: Callable[[R, np.ndarray, int], Any]
-    """A row, its denoised state and the level of that to what is kept of it."""
+    """A row, its denoised state and the level of that to the part that is stored of it."""
     poses: Callable[[list[Any]], np.ndarray]
-    """What was kept of rows, from the first one on and in order, to (people, frames, 22, 3)."""
+    """The stored parts of rows, from the first one on and in order, to (people, frames, 22, 3)."""
     each: int | None = None
     """Rows of one motion where the chain is several of them, which share nothing; None: all are of one."""
     begin: float = 0.0
     """As of `Denoised`."""
 
 
-class Latest(Generic[R]):
+class LatestEstimates(Generic[R]):
     """The newest prediction for each segment of a long motion.
 
-    It is kept only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
+    It is stored only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
     """
 
     def __init__(self, view: ChainView[R], steps: int) -> None:

@@ -22,15 +22,15 @@ CONTEXT = 3.0
 """Seconds of a clip that are looked at for where its floor is."""
 TEMPERATURE_AFTER_FIRST = 1.08
 """How much livelier the windows behind the first begin: the network goes on from its own calm; docs/decisions/0015."""
-SUNK, EASE = 0.02, 0.2
+MOST_SUNK, EASE = 0.02, 0.2
 """Metres under the floor that are left, and seconds in which people who would sink further are lifted."""
-Given = Callable[[int, int], Known | None]
+KnownFrames = Callable[[int, int], Known | None]
 """(first, last): what is known of the frames ``first`` to before ``last`` behind the past, 1 being the first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """The clip that futures go on from: put onto the uniform person once, and carried along."""
+    """The clip that futures go on from: retargeted to the uniform person once."""
 
     motion: Motion
     tail: Motion
@@ -52,8 +52,8 @@ class Past:
         whole = int((len(motion) - 1) / motion.fps * predictor.fps + 1e-6) + 1
         back = np.arange(min(max(whole, 2), predictor.observed))[::-1] / predictor.fps * motion.fps
         person = person_at(context, len(context) - 1 - back)
-        seen = max(int(back[0] + 1e-6) + 1, 2)
-        tail = motion.frames(max(len(motion) - seen, 0), len(motion))
+        observed = max(int(back[0] + 1e-6) + 1, 2)
+        tail = motion.frames(max(len(motion) - observed, 0), len(motion))
         return Past(motion, tail, person, predictor.fps / motion.fps, predictor.observed)
 
 
@@ -67,16 +67,16 @@ class WindowSampler:
     """False: the person stays in place, but rises and sinks."""
 
     def windows(
-        self, person: Array, seeds: Sequence[tuple[int, int]], given: Given | None, count: int
+        self, person: Array, seeds: Sequence[tuple[int, int]], known_frames: KnownFrames | None, count: int
     ) -> Iterator[Array]:
         """(rows, frames, 22, 3) one after the other behind ``person`` (rows, h, 22, 3)."""
         frames = self.predictor.frames - self.predictor.observed
         for number in range(count):
             first = number * frames + 1
-            known = given(first, first + self.predictor.frames - person.shape[1]) if given else None
-            made = self.window(person, seeds, number, known, livelier=TEMPERATURE_AFTER_FIRST if number else 1.0)
-            yield made
-            person = np.concatenate([person, made], axis=1)[:, -self.predictor.observed :]
+            known = known_frames(first, first + self.predictor.frames - person.shape[1]) if known_frames else None
+            window = self.window(person, seeds, number, known, livelier=TEMPERATURE_AFTER_FIRST if number else 1.0)
+            yield window
+            person = np.concatenate([person, window], axis=1)[:, -self.predictor.observed :]
 
     def window(
         self,
@@ -89,7 +89,7 @@ class WindowSampler:
         livelier: float = 1.0,
     ) -> Array:
         """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
-        made = next_frames(
+        positions = next_frames(
             self.predictor,
             person,
             seeds=[row_seed(*seed, number) for seed in seeds],
@@ -97,14 +97,14 @@ class WindowSampler:
             frames=frames,
             sampling=replace(self.sampling, temperature=min(self.sampling.temperature * livelier, 2.0)),
         )
-        lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
-        under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
+        lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -MOST_SUNK)  # who is lower already stays there
+        under = (lowest[:, None] - positions[..., 1].min(axis=-1)).clip(0)
         ease = max(round(EASE * self.predictor.fps), 1)
-        lift = envelope(under, ease // 2) * smoothstep(np.arange(1, made.shape[1] + 1) / (2 * ease))
-        made = made + lift[..., None, None] * [0, 1, 0]
-        return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
+        lift = envelope(under, ease // 2) * smoothstep(np.arange(1, positions.shape[1] + 1) / (2 * ease))
+        positions = positions + lift[..., None, None] * [0, 1, 0]
+        return positions if self.root else positions + (person[:, -1:, :1] - positions[:, :, :1]) * [1, 0, 1]
 
 
-def windows_for(predictor: Predictor, seconds: float) -> int:
+def window_count(predictor: Predictor, seconds: float) -> int:
     """How many windows it takes."""
     return int(np.ceil(seconds * predictor.fps / (predictor.frames - predictor.observed) - 1e-6))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionloom.arrays import unit
 from motionloom.errors import MotionloomError
-from motionloom.goals.remarks import looked_up
+from motionloom.goals.remarks import nearest_known
 from motionloom.runtime.text.known import (
     Known,
     Nearest,
@@ -116,9 +116,9 @@ def test_the_weights_that_ship_know_everyday_actions_and_no_golf() -> None:
     prior = Prior.load("default")
     assert prior.known is not None
     unknown = ["a man plays golf", "a woman rides a bicycle", "a woman irons a shirt", "he drives a car"]
-    assert sum(found.near for found in looked_up(unknown, prior.known, prior.text)) <= 1
+    assert sum(found.near for found in nearest_known(unknown, prior.known, prior.text)) <= 1
     everyday = ["a person walks forward", "someone jumps", "a person sits down", "a man waves with the right hand"]
-    assert all(found.near for found in looked_up(everyday, prior.known, prior.text))
+    assert all(found.near for found in nearest_known(everyday, prior.known, prior.text))
 
 
 def table() -> Known:

@@ -115,7 +115,7 @@ def _target(one: Any, nearest: dict[str, str], size: float, clock: Clock) -> Goa
     joint, goal = SMPL22.index(nearest[one.joint]), Goal.nothing(clock.sampled_frames)
     for frame, place in zip(one.frames, one.positions, strict=True):
         at = clock.frame(frame)
-        goal.positions[at, joint], goal.asked[at, joint] = np.asarray(place, dtype=np.float64) / size, True
+        goal.positions[at, joint], goal.mask[at, joint] = np.asarray(place, dtype=np.float64) / size, True
     if not np.isfinite(goal.positions).all():
         raise MotionloomError(f"the places of {one.joint} must be finite numbers")
     return goal
@@ -153,7 +153,7 @@ def as_goal(pose: Keyframe, frames: int) -> Goal:
     """A pose in the world as a goal of so many frames."""
     goal = Goal.nothing(frames)
     goal.positions[pose.frame] = pose.places
-    goal.asked[pose.frame] = pose.asked[:, None]
+    goal.mask[pose.frame] = pose.asked[:, None]
     return goal
 
 
@@ -165,11 +165,11 @@ def standing_as(pose: Keyframe, person: Array) -> Keyframe:
 
 def whole_path(goal: Goal) -> Goal:
     """The goal with a place for the pelvis in every frame: between and around those that are asked, straight on."""
-    asked = goal.asked[:, 0, [0, 2]].all(axis=-1)
+    asked = goal.mask[:, 0, [0, 2]].all(axis=-1)
     frames = np.flatnonzero(asked)
-    positions, flags = goal.positions.copy(), goal.asked.copy()
+    positions, flags = goal.positions.copy(), goal.mask.copy()
     for axis in (0, 2):
         known = goal.positions[frames, 0, axis]
         positions[:, 0, axis] = np.interp(np.arange(len(goal)), frames, known)
         flags[:, 0, axis] = True
-    return replace(goal, positions=positions, asked=flags)
+    return replace(goal, positions=positions, mask=flags)

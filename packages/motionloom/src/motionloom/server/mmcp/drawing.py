@@ -23,7 +23,7 @@ from motionloom.requests.sampling import Sampling
 from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
 from motionloom.server.mmcp.rigs import Rig, read_rig
 from motionloom.tasks.run import Models, Plan, run, run_each
-from motionloom.tasks.splice import carried_level, concatenated, standing
+from motionloom.tasks.splice import concatenate, ground_pose_at, move_on_floor
 from motionloom.tasks.worded import read
 
 Array = NDArray[np.float64]
@@ -181,8 +181,8 @@ def _steered(sampler: _Sampler, segments: list[Segment], goal: Goal, seed: int) 
     if len(segments) == 1:
         place = start_of(goal)
         (only,) = segments
-        return sampler.compose([replace(only, goal=goal.seen_from(place))], seed).placed(place)
-    if goal.asked[:, 0, [0, 2]].all(axis=-1).any():
+        return sampler.compose([replace(only, goal=goal.relative_to(place))], seed).placed(place)
+    if goal.mask[:, 0, [0, 2]].all(axis=-1).any():
         return sampler.compose(segments, seed, whole_path(goal))
     return fit(sampler.compose(segments, seed), goal)
 
@@ -198,8 +198,8 @@ def _posed(goal: Goal, asked: Asked, motion: Motion) -> Goal:
     places = motion.positions()
     for pose in asked.floating:
         other = as_goal(standing_as(pose, places[pose.frame]), len(goal))
-        positions = np.where(goal.asked, goal.positions, other.positions)
-        goal = replace(goal, positions=positions, asked=goal.asked | other.asked)
+        positions = np.where(goal.mask, goal.positions, other.positions)
+        goal = replace(goal, positions=positions, mask=goal.mask | other.mask)
     return goal
 
 
@@ -216,7 +216,7 @@ def _poses(sampler: _Sampler, request: Any, seed: int) -> Motion:
     ]
     made = [result.people[0] for _, result in run_each(plans, sampler.models)]
     middle = [motion.frames(len(motion) // 2, len(motion) // 2 + 1) for motion in made]
-    return concatenated(*middle, *[middle[-1]] * 4)  # the clock takes as many as it needs
+    return concatenate(*middle, *[middle[-1]] * 4)  # the clock takes as many as it needs
 
 
 def _like(sampler: _Sampler, request: Any, rig: Rig, clock: Clock, seed: int) -> Motion:
@@ -252,9 +252,9 @@ def _performance(sampler: _Sampler, segment: Any, rig: Rig, frames: int, seed: i
 
 
 def _joined(sampler: _Sampler, before: Motion, behind: Motion, seed: int) -> Motion:
-    behind = carried_level(behind, standing(behind, 0), standing(before, len(before) - 1))
+    behind = move_on_floor(behind, ground_pose_at(behind, 0), ground_pose_at(before, len(before) - 1))
     seam = before.seconds
-    whole = concatenated(before, behind)
+    whole = concatenate(before, behind)
     around = min(SEAM, before.seconds / 2, behind.seconds / 2)
     span = (seam - around, min(seam + around, whole.seconds))
     return sampler.edit(Edit(motion=whole, between=(span,)), seed)
@@ -268,7 +268,7 @@ def _looped(sampler: _Sampler, motion: Motion, seed: int) -> Motion:
     step = (cycle.root[1] - cycle.root[0]) * np.array([1.0, 0.0, 1.0])
     place = cycle.root[-1:] + step
     place[:, 1] = last.root[:, 1]
-    return concatenated(cycle, replace(last, root=place))
+    return concatenate(cycle, replace(last, root=place))
 
 
 def on_ground(motion: Motion, ground: Array) -> Motion:
@@ -295,5 +295,5 @@ def on_ground(motion: Motion, ground: Array) -> Motion:
     for foot, joint in enumerate(joints):
         at = standing[:, foot]
         goal.positions[at, joint] = feet[at, foot] + height[at, foot, None] * [0.0, 1.0, 0.0]
-        goal.asked[at, joint] = True
+        goal.mask[at, joint] = True
     return fit(raised, goal)

@@ -12,8 +12,8 @@ from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.edit import changes_asked, edit
-from motionloom.tasks.laid import Lay, Look, Smooth
+from motionloom.tasks.direct_edits import Look, Overlay, Smooth
+from motionloom.tasks.edit import changes_from_options, edit
 from motionloom.tasks.run import Models, Plan, run
 from tests.recorded import tiny
 from tests.tasks.test_edit import person, rig
@@ -31,7 +31,7 @@ def waving(seconds: float, fps: float = 30.0) -> Motion:
     return Motion(SMPL22, fps, np.tile([9.0, 0.95, 9.0], (frames, 1)), rot.rotvec_to_quat(turns))
 
 
-def changed(clip: Motion, *changes: Lay | Look | Smooth) -> Motion:
+def changed(clip: Motion, *changes: Overlay | Look | Smooth) -> Motion:
     """One version, of weights that are not used."""
     return edit(tiny.prior(), clip, "", changes)[0]
 
@@ -43,7 +43,7 @@ def gaze(motion: Motion) -> np.ndarray:
 
 def test_an_arm_follows_another_clip_and_the_rest_stays() -> None:
     clip = person(4.0)
-    made = changed(clip, Lay(((1.0, 3.0),), waving(5.0), ALL_BUT_THE_ARM))
+    made = changed(clip, Overlay(((1.0, 3.0),), waving(5.0), ALL_BUT_THE_ARM))
     others = [joint for joint in range(22) if joint not in SMPL22.groups["right_arm"]]
     assert np.array_equal(made.rotations[:, others], clip.rotations[:, others])
     assert np.array_equal(made.root, clip.root)
@@ -56,7 +56,7 @@ def test_an_arm_follows_another_clip_and_the_rest_stays() -> None:
 
 def test_another_body_follows_as_well_and_no_longer_than_the_clip_lasts() -> None:
     clip = from_smpl22(person(4.0), rig())
-    made = changed(clip, Lay(((1.0, 4.0),), waving(1.0), ALL_BUT_THE_ARM))
+    made = changed(clip, Overlay(((1.0, 4.0),), waving(1.0), ALL_BUT_THE_ARM))
     up = joints22(made)[:, RIGHT_WRIST, 1] - joints22(clip)[:, RIGHT_WRIST, 1]
     assert up[25:35].min() > 0.3
     assert np.array_equal(made.rotations[40:], clip.rotations[40:])
@@ -97,7 +97,7 @@ ALL_BUT_THE_HEAD = ("lower_body", "torso", "left_arm", "right_arm")
 
 def moved(words: str, clip: Motion, *spans: tuple[float, float]) -> np.ndarray:
     """(frames, 2) degrees to the left and up of where the head looked, of a clip that faces +Z or nearly."""
-    made = changed(clip, *changes_asked(words, keep=ALL_BUT_THE_HEAD, between=spans))
+    made = changed(clip, *changes_from_options(words, keep=ALL_BUT_THE_HEAD, between=spans))
     others = [joint for joint in range(22) if joint not in SMPL22.groups["head_neck"]]
     assert np.array_equal(made.rotations[:, others], clip.rotations[:, others])
     assert np.allclose(looks(made), gaze(made), atol=0.06), "the uniform person's face is to the front of its head"
@@ -131,8 +131,8 @@ def test_a_head_does_what_words_say_of_it() -> None:
 
 def test_words_that_say_nothing_of_a_head_are_refused() -> None:
     with pytest.raises(MotionloomError, match=r"a head nods, shakes, looks left.*'kicks' says none of these"):
-        changes_asked("kicks", keep=ALL_BUT_THE_HEAD)
-    assert [type(one).__name__ for one in changes_asked("kicks", keep=ALL_BUT_THE_ARM)] == ["Redraw"]
+        changes_from_options("kicks", keep=ALL_BUT_THE_HEAD)
+    assert [type(one).__name__ for one in changes_from_options("kicks", keep=ALL_BUT_THE_ARM)] == ["Redraw"]
 
 
 def test_a_look_begins_and_ends_softly() -> None:
@@ -148,13 +148,13 @@ def test_a_look_begins_and_ends_softly() -> None:
 
 def test_what_is_asked_becomes_changes_and_what_cannot_be_is_refused() -> None:
     place = np.zeros(3)
-    assert [type(one) for one in changes_asked("", source=waving(1.0), keep=["head"])] == [Lay]
-    assert [type(one).__name__ for one in changes_asked("waves", look=place)] == ["Redraw", "Look"]
-    assert [type(one).__name__ for one in changes_asked("", look=place, between=[(0, 1)])] == ["Look"]
+    assert [type(one) for one in changes_from_options("", source=waving(1.0), keep=["head"])] == [Overlay]
+    assert [type(one).__name__ for one in changes_from_options("waves", look=place)] == ["Redraw", "Look"]
+    assert [type(one).__name__ for one in changes_from_options("", look=place, between=[(0, 1)])] == ["Look"]
     with pytest.raises(MotionloomError, match="a text says or what another clip does; leave out one"):
-        changes_asked("waves", source=waving(1.0))
+        changes_from_options("waves", source=waving(1.0))
     with pytest.raises(MotionloomError, match="no part called 'tail' to keep"):
-        Lay((), waving(1.0), ["tail"])
+        Overlay((), waving(1.0), ["tail"])
     with pytest.raises(MotionloomError, match="no stretch from 1 to 9 s"):
         changed(person(4.0), Look(((1.0, 9.0),), place))
     with pytest.raises(MotionloomError, match="look must be a list of 3 numbers"):
@@ -215,5 +215,5 @@ def test_only_a_stretch_and_only_some_parts_are_smoothed() -> None:
 
 
 def test_smoothing_is_asked_with_seconds_and_alone() -> None:
-    assert [type(one) for one in changes_asked("", smooth=0.2, keep=["head"], between=[(0, 1)])] == [Smooth]
-    assert [type(one).__name__ for one in changes_asked("waves", smooth=0.2)] == ["Redraw", "Smooth"]
+    assert [type(one) for one in changes_from_options("", smooth=0.2, keep=["head"], between=[(0, 1)])] == [Smooth]
+    assert [type(one).__name__ for one in changes_from_options("waves", smooth=0.2)] == ["Redraw", "Smooth"]

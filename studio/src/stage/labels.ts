@@ -1,11 +1,11 @@
-/** Over the heads of two people: who is asked to do what at the playhead, on the page and in films. */
+/** Labels over the heads of two people: the words of each at the playhead, on the page and in films. */
 
 import * as THREE from "three";
 import { type App, denoised, shownClip } from "../app/app";
 import { h } from "../app/dom";
 import { jointAt } from "../body/clip";
 import { HEAD } from "../body/skeleton";
-import { STANDS } from "../project/goals";
+import { STANDS_STILL } from "../project/goals";
 import { begins } from "../project/model";
 import type { Scene } from "./scene";
 
@@ -16,12 +16,12 @@ const [WIDE, HIGH] = [200, 26];
 
 /** Words, and the pixel at the middle of their lower edge. */
 interface Tag {
-  readonly said: string;
+  readonly label: string;
   readonly x: number;
   readonly y: number;
 }
 
-export class Said {
+export class HeadLabels {
   private readonly tags = [0, 1].map((who) =>
     h("span", { class: `tag who${who}`, "aria-hidden": "true", hidden: true }),
   );
@@ -35,14 +35,14 @@ export class Said {
       this.over(width, height).forEach((one, who) => one && draw(pen, one, getComputedStyle(this.tags[who]!)));
   }
 
-  /** Put the words where the heads are in the picture. */
-  tell(): void {
+  /** Move the labels to the heads in the picture. */
+  update(): void {
     const { clientWidth, clientHeight } = this.scene.canvas;
     this.over(clientWidth, clientHeight).forEach((one, who) => {
       const tag = this.tags[who]!;
       tag.hidden = one === null;
       if (!one) return;
-      if (tag.textContent !== one.said) tag.textContent = one.said;
+      if (tag.textContent !== one.label) tag.textContent = one.label;
       tag.style.transform = `translate(-50%, -100%) translate(${Math.round(one.x)}px, ${Math.round(one.y)}px)`;
     });
   }
@@ -65,14 +65,14 @@ export class Said {
     const isClose = Math.abs(first!.x - second!.x) < WIDE && Math.abs(first!.y - second!.y) < HIGH;
     if (isClose) first!.y = second!.y - HIGH;
     return [first!, second!].map(({ x, y, isSeen }, who) => {
-      const said = (who === 1 && one.other.trim()) || one.text.trim() || STANDS;
-      return isSeen ? { said, x, y } : null;
+      const label = (who === 1 && one.other.trim()) || one.text.trim() || STANDS_STILL;
+      return isSeen ? { label, x, y } : null;
     });
   }
 }
 
 /** Draw a tag as the page shows it. */
-function draw(pen: CanvasRenderingContext2D, { said, x, y }: Tag, look: CSSStyleDeclaration): void {
+function draw(pen: CanvasRenderingContext2D, { label, x, y }: Tag, look: CSSStyleDeclaration): void {
   const { fontSize, lineHeight, paddingTop, paddingLeft, borderLeftWidth, borderTopLeftRadius, maxWidth } = look;
   const [letters, up, inset, edge, round, most] = [
     lineHeight,
@@ -84,9 +84,9 @@ function draw(pen: CanvasRenderingContext2D, { said, x, y }: Tag, look: CSSStyle
   ].map(parseFloat);
   pen.save();
   pen.font = `${fontSize} ${look.fontFamily}`;
-  let text = said;
+  let text = label;
   const room = most! - edge! - 2 * inset!;
-  for (let n = said.length; pen.measureText(text).width > room && n > 0; n -= 1) text = `${said.slice(0, n)}…`;
+  for (let n = label.length; pen.measureText(text).width > room && n > 0; n -= 1) text = `${label.slice(0, n)}…`;
   const [wide, high] = [pen.measureText(text).width + edge! + 2 * inset!, letters! + 2 * up!];
   pen.translate(Math.round(x - wide / 2), Math.round(y - high));
   pen.beginPath();

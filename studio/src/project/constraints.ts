@@ -1,4 +1,4 @@
-/** Edits of what is asked besides words: a path, targets of joints, poses. `who` is 0 or 1. */
+/** Edits of constraints besides words: a path, targets of joints, poses. `who` is 0 or 1. */
 
 import {
   type Path,
@@ -19,7 +19,7 @@ import { PELVIS } from "../body/skeleton";
 import { type Ground, pathPoint, simplified } from "./path";
 import { changePerson } from "./timeline";
 
-/** Seconds between the points of a way that is kept. */
+/** Seconds between the points of a path from a motion. */
 const WAY_STEP = 0.5;
 
 export function setPath(project: Project, who: number, path: Path | null): Project {
@@ -59,10 +59,10 @@ export function setSpeed(project: Project, who: number, speed: number | null): P
 }
 
 /**
- * Whether somebody's joints are asked for and nobody says where the person goes: over several blocks the server has to
+ * The first person with targets or poses but without a path, or -1: over several blocks the server has to
  * know the way to say where a joint is.
  */
-export function needsWay(project: Project): number {
+export function personWithoutPath(project: Project): number {
   if (project.segments.length < 2 || hasPath(project.given?.path)) return -1;
   return project.people.findIndex((one) => !one.path && (one.targets.length > 0 || one.poses.length > 0));
 }
@@ -71,8 +71,8 @@ function hasPath(goal: unknown): boolean {
   return typeof goal === "string" || (typeof goal === "object" && goal !== null && "path" in goal);
 }
 
-/** The way of a motion as it is, as a path with its times and facings. */
-export function keepWay(project: Project, who: number, clip: MotionClip): Project {
+/** The path of a motion, with its times and facings. */
+export function pathFromMotion(project: Project, who: number, clip: MotionClip): Project {
   const seconds = Math.min(length(project), clip.seconds - 1 / clip.fps);
   const count = Math.max(Math.round(seconds / WAY_STEP), 1);
   const times = Array.from({ length: count + 1 }, (_, n) => toFrame((seconds * n) / count));
@@ -83,8 +83,8 @@ export function keepWay(project: Project, who: number, clip: MotionClip): Projec
   return setPath(project, who, { points, speed: null, times, given: null });
 }
 
-/** Ask for a joint at a time: its target there moves, or a new one with this name appears. */
-export function putTarget(
+/** Set a target of a joint at a time: its target there moves, or a new one with this name appears. */
+export function setTarget(
   project: Project,
   who: number,
   joint: number,
@@ -139,8 +139,8 @@ export function removeTarget(project: Project, who: number, id: string): Project
   }));
 }
 
-/** Ask for a whole pose at a time; one that is there at that frame is replaced. */
-export function putPose(
+/** Add a whole pose at a time; it replaces one of the same frame. */
+export function setPose(
   project: Project,
   who: number,
   name: string,
@@ -166,7 +166,7 @@ export function fillPoses(project: Project, who: number, id: string, count: numb
   return between(from.positions, to.positions, count).reduce((now, positions, index) => {
     const time = toFrame(from.time + ((to.time - from.time) * (index + 1)) / (count + 1));
     const isFree = time > from.time && time < to.time && !poseNear(now, who, time);
-    return isFree ? putPose(now, who, "in between", time, positions) : now;
+    return isFree ? setPose(now, who, "in between", time, positions) : now;
   }, project);
 }
 
@@ -188,8 +188,8 @@ export function removePose(project: Project, who: number, id: string): Project {
   return changePerson(project, who, (person) => ({ ...person, poses: person.poses.filter((one) => one.id !== id) }));
 }
 
-/** A pose put where somebody stands and faces: `pose` with its pelvis over `at`. */
-export function movedTo(positions: readonly Vec3[], at: Ground): Vec3[] {
+/** A pose moved along the floor: its pelvis is over `at`. */
+export function moveTo(positions: readonly Vec3[], at: Ground): Vec3[] {
   const [x, , z] = positions[0]!;
   return positions.map(([px, y, pz]) => rounded([px - x + at.x, y, pz - z + at.z]));
 }

@@ -1,4 +1,4 @@
-/** What is asked besides words: the panels of the path, of joints at times and of poses. */
+/** The panels of constraints besides words: the path, targets of joints, poses. */
 
 import type { Actions } from "../app/actions";
 import { type App, shownClip } from "../app/app";
@@ -6,7 +6,7 @@ import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
 import { NOTHING } from "../app/session";
 import { jointName } from "../body/skeleton";
-import { changePoint, changeTarget, removePose, removeTarget, setPath, setSpeed } from "../project/asks";
+import { changePoint, changeTarget, removePose, removeTarget, setPath, setSpeed } from "../project/constraints";
 import { FLYING, UNMET, isMeasurable, pathMiss, poseMiss, targetLift, targetMiss } from "../project/misses";
 import { type Person, type Project, length, round } from "../project/model";
 import { pathLength, timed } from "../project/path";
@@ -14,25 +14,30 @@ import { miss, numberField, section, textButton, wrong } from "./parts";
 
 /** Centimetres beyond which a path counts as missed. */
 const OFF_PATH = 15;
-/** Poses that are put between two at most. */
+/** Poses between two at most. */
 const MOST_FILLED = 20;
-/** Centimetres that feet leave the floor by in a step. */
+/** Centimetres by which feet leave the floor in a step. */
 const STEP = 12;
 
-export function askedPanels(
-  app: App,
-  project: Project,
-  person: Person,
-  who: number,
-  actions: Actions,
-  deeds: Deeds,
-): HTMLElement[] {
+/** What the panels of one person show and change. */
+export interface PersonContext {
+  readonly app: App;
+  readonly project: Project;
+  readonly person: Person;
+  /** 0 or 1. */
+  readonly who: number;
+  readonly actions: Actions;
+  readonly deeds: Deeds;
+}
+
+export function constraintPanels(context: PersonContext): HTMLElement[] {
+  const { app, project, person } = context;
   const { tool } = app.session.value;
   const panels = [];
-  if (person.path || tool === "path") panels.push(pathPanel(app, project, person, who));
-  if (tool === "target") panels.unshift(targetPanel(app, project, person, who));
-  else if (person.targets.length) panels.push(targetPanel(app, project, person, who));
-  if (person.poses.length) panels.push(posePanel(app, project, person, who, actions, deeds));
+  if (person.path || tool === "path") panels.push(pathPanel(context));
+  if (tool === "target") panels.unshift(targetPanel(context));
+  else if (person.targets.length) panels.push(targetPanel(context));
+  if (person.poses.length) panels.push(posePanel(context));
   if (project.base && panels.length)
     panels.push(
       h(
@@ -44,7 +49,7 @@ export function askedPanels(
   return panels;
 }
 
-function pathPanel(app: App, project: Project, person: Person, who: number): HTMLElement {
+function pathPanel({ app, project, person, who }: PersonContext): HTMLElement {
   const { path } = person;
   if (!path)
     return section(
@@ -56,7 +61,7 @@ function pathPanel(app: App, project: Project, person: Person, who: number): HTM
       ),
     );
   const seconds = length(project);
-  const walked = timed(path, seconds);
+  const schedule = timed(path, seconds);
   const clip = shownClip(app);
   const off = isMeasurable(project, clip) ? pathMiss(clip, who, person, seconds) : null;
   const { selection } = app.session.value;
@@ -67,9 +72,9 @@ function pathPanel(app: App, project: Project, person: Person, who: number): HTM
     h(
       "p",
       { class: "quiet" },
-      `${path.points.length} points, ${pathLength(path.points).toFixed(1)} m, ${walked ? `${walked.speed.toFixed(2)} m/s` : "too short"}`,
+      `${path.points.length} points, ${pathLength(path.points).toFixed(1)} m, ${schedule ? `${schedule.speed.toFixed(2)} m/s` : "too short"}`,
     ),
-    walked?.hurried &&
+    schedule?.hurried &&
       h(
         "p",
         { class: "unmet" },
@@ -119,7 +124,7 @@ function pathPanel(app: App, project: Project, person: Person, who: number): HTM
   );
 }
 
-function targetPanel(app: App, project: Project, person: Person, who: number): HTMLElement {
+function targetPanel({ app, project, person, who }: PersonContext): HTMLElement {
   const clip = shownClip(app);
   const { selection } = app.session.value;
   if (!person.targets.length)
@@ -209,14 +214,7 @@ function flight(centimetres: number): HTMLElement | false {
   return h("span", { class: centimetres > FLYING ? "miss unmet" : "miss", title }, `↑ ${centimetres.toFixed(0)} cm`);
 }
 
-function posePanel(
-  app: App,
-  project: Project,
-  person: Person,
-  who: number,
-  actions: Actions,
-  deeds: Deeds,
-): HTMLElement {
+function posePanel({ app, project, person, who, actions, deeds }: PersonContext): HTMLElement {
   const clip = shownClip(app);
   const { selection, tool } = app.session.value;
   const chosen = selection.kind === "pose" && person.poses.find((one) => one.id === selection.id);

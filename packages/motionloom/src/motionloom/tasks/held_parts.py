@@ -1,4 +1,4 @@
-"""Parts of a prediction that are given: held to what another motion does."""
+"""Parts of a prediction that are held to another motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known
-from motionloom.tasks.splice import carried_level, concatenated, kept_parts, overlaid, standing
+from motionloom.tasks.splice import concatenate, ground_pose_at, kept_parts, move_on_floor, overlay
 from motionloom.tasks.windows import CONTEXT, Past
 from motionloom.weights.predictor import Predictor
 
@@ -27,7 +27,7 @@ NEAR = (0.3, np.radians(20))
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class HeldParts:
     """A `FixedJoints`, ready: on the grid of the predictor for the network, on the past's skeleton for the result."""
 
     places: Array
@@ -47,47 +47,47 @@ class Given:
             return None
         return Known(self.places[frames], self.mask[frames])
 
-    def laid_over(self, new: Motion, done: int) -> Motion:
-        """A piece that begins ``done`` frames behind the past, with the parts that are given there."""
+    def overlay_on(self, new: Motion, done: int) -> Motion:
+        """A piece that begins ``done`` frames behind the past, with the held parts there."""
         count = min(len(new), len(self.source) - done)
         if count <= 0:
             return new
         here = slice(done, done + count)
-        held = overlaid(new.frames(0, count), self.source.frames(done, done + count), self.joints[here], self.way[here])
-        return concatenated(held, new.frames(count, len(new))) if count < len(new) else held
+        held = overlay(new.frames(0, count), self.source.frames(done, done + count), self.joints[here], self.way[here])
+        return concatenate(held, new.frames(count, len(new))) if count < len(new) else held
 
 
-def given(predictor: Predictor, seen: Past, hold: FixedJoints, seconds: float) -> Given:
-    """A hold made ready for a past and a horizon; raises MotionloomError for what cannot be held."""
-    past = seen.motion
+def prepare_hold(predictor: Predictor, history: Past, hold: FixedJoints, seconds: float) -> HeldParts:
+    """The held parts for a past and a horizon; raises MotionloomError for parts that cannot be held."""
+    past = history.motion
     check_like(past, hold.source, "motion that parts are held to")
     _check_parts(hold, seconds)
-    rate, total = seen.rate, max(round(seconds * past.fps), 1)
-    source = _placed(past, hold.source) if hold.align else hold.source
+    rate, total = history.rate, max(round(seconds * past.fps), 1)
+    source = _moved_to_past(past, hold.source) if hold.align else hold.source
     source = source.frames(0, total + int(np.ceil(predictor.frames / rate)))  # the last window looks further
     end = len(source) / past.fps
     tail = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
-    together = to_smpl22(concatenated(tail, source)).positions()
-    together = together + (seen.person[-1, 0] - together[len(tail) - 1, 0])
+    together = to_smpl22(concatenate(tail, source)).positions()
+    together = together + (history.person[-1, 0] - together[len(tail) - 1, 0])
     count = int(len(source) * rate + 1e-6)
     places = positions_at(together, len(tail) - 1 + np.arange(1, count + 1) / rate)
-    source = concatenated(source, *[source.frames(len(source) - 1, len(source))] * round(RAMP * past.fps))
+    source = concatenate(source, *[source.frames(len(source) - 1, len(source))] * round(RAMP * past.fps))
     mask = np.zeros((count, predictor.layout.parts), dtype=np.float32)
     joints, way = np.zeros((len(source), len(past.skeleton))), np.zeros(len(source))
     for part in hold.parts:
-        chosen, root = _resolved(part)
+        chosen, root = _resolve_joints(part)
         spans = [(begin, min(until, end)) for begin, until in part.spans if begin < end]
         inside = _weights(spans, np.arange(1, count + 1) / predictor.fps, 0.0) >= 1
         for joint in chosen | ({0} if root else set()):
             mask[inside, predictor.layout.part(joint)] = 1
         weight = _weights(spans, np.arange(1, len(source) + 1) / past.fps, RAMP)
-        flags = _own_joints(past, chosen)
+        flags = _joint_flags(past, chosen)
         joints = np.maximum(joints, weight[:, None] * flags)
         way = np.maximum(way, weight * root)
-    return Given(places, mask, source, joints, way)
+    return HeldParts(places, mask, source, joints, way)
 
 
-def _own_joints(past: Motion, chosen: frozenset[int] | set[int]) -> Array:
+def _joint_flags(past: Motion, chosen: frozenset[int] | set[int]) -> Array:
     """(joints,) 1 for the past's joints that correspond to some of the 22, and for what hangs on them."""
     always = kept_parts(past.skeleton).joints
     flags = kept_parts(past.skeleton, frozenset(chosen)).joints & ~always
@@ -105,18 +105,22 @@ def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) ->
     return weight
 
 
-def _resolved(part: FixedPart) -> tuple[set[int], bool]:
+def _resolve_joints(part: FixedPart) -> tuple[set[int], bool]:
     joints = set(SMPL22.resolve(name for name in part.joints if name != "root"))
     return joints, "root" in part.joints or 0 in joints
 
 
-def _placed(past: Motion, source: Motion) -> Motion:
+def _moved_to_past(past: Motion, source: Motion) -> Motion:
     """The source where the past ends, if it is not there."""
-    end, begin, before = standing(past, len(past) - 1), standing(source, 0), standing(past, max(len(past) - 2, 0))
+    end, begin, before = (
+        ground_pose_at(past, len(past) - 1),
+        ground_pose_at(source, 0),
+        ground_pose_at(past, max(len(past) - 2, 0)),
+    )
     metres, radians = end.apart(begin)
     if radians < NEAR[1] and metres < NEAR[0]:
         return source
-    return carried_level(source, begin, replace(end, x=2 * end.x - before.x, z=2 * end.z - before.z))
+    return move_on_floor(source, begin, replace(end, x=2 * end.x - before.x, z=2 * end.z - before.z))
 
 
 def check_like(past: Motion, other: Motion, what: str) -> None:
@@ -145,7 +149,7 @@ def _check_parts(hold: FixedJoints, seconds: float) -> None:
     for begin, end in (span for part in hold.parts for span in part.spans):
         _check_span(begin, end, hold.source, seconds)
     everywhere = [p for p in hold.parts if any(a <= 0 and b >= seconds for a, b in p.spans)]
-    joints = set().union(*(_resolved(part)[0] for part in everywhere)) if everywhere else set()
+    joints = set().union(*(_resolve_joints(part)[0] for part in everywhere)) if everywhere else set()
     if len(joints) == len(SMPL22):
         raise MotionloomError("nothing to predict: all joints are held; hold fewer")
 

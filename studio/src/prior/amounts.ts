@@ -2,7 +2,7 @@
 
 import type { Place, Way } from "./path";
 import { FASTEST, between } from "./path";
-import { sums, unwrapped } from "./dense";
+import { sums, unwrapAngles } from "./dense";
 import { LEFT, RIGHT } from "./person";
 import { type Vec, clip, rounded } from "./turns";
 import { type Amount, RADIUS, described, isSeveral, once, readAmount, readSeconds } from "./words";
@@ -38,9 +38,9 @@ export interface Reading {
 
 export function reading(text: string, fps: number, longest: number): Reading {
   if (isSeveral(text)) return { amount: null, seconds: null };
-  const [found, said] = [readAmount(text), readSeconds(text)];
-  const amount = found && secondsFor(found, fps) <= longest ? found : null;
-  const seconds = said ?? (amount && secondsFor(amount, fps));
+  const [amountInText, explicit] = [readAmount(text), readSeconds(text)];
+  const amount = amountInText && secondsFor(amountInText, fps) <= longest ? amountInText : null;
+  const seconds = explicit ?? (amount && secondsFor(amount, fps));
   return { amount, seconds: seconds && Math.min(seconds, longest) };
 }
 
@@ -62,10 +62,10 @@ export function partsOf(text: string, seconds: number, amount: Amount | null, fp
     const asked = amount.kind === "steps" ? { ...amount, metres: amount.metres * share } : amount;
     return [{ ...whole, way: wayFor(asked, seconds, fps) }];
   }
-  const [stroke, said] = [tables.strokes[amount.of!], once(text)];
-  if (stroke < CHAINED) return [{ ...whole, text: said, seconds: Math.max(1, rounded(seconds * fps)) / fps }];
+  const [stroke, single] = [tables.strokes[amount.of!], once(text)];
+  if (stroke < CHAINED) return [{ ...whole, text: single, seconds: Math.max(1, rounded(seconds * fps)) / fps }];
   const each = Math.max(1, rounded(Math.min(stroke, seconds / amount.size) * fps)) / fps;
-  const part = { ...whole, text: said, seconds: each, transition: Math.min(TRANSITION, each / 2) };
+  const part = { ...whole, text: single, seconds: each, transition: Math.min(TRANSITION, each / 2) };
   return Array.from({ length: amount.size }, () => part);
 }
 
@@ -148,7 +148,7 @@ export function measured(amount: Amount, places: readonly (readonly Vec[])[], fp
       0,
     );
   }
-  const facing = unwrapped(
+  const facing = unwrapAngles(
     places.map((at) => {
       const wide = (axis: 0 | 2): number =>
         [LEFT, RIGHT].reduce(

@@ -1,10 +1,10 @@
-/** A motion that is there and stays, until somebody changes the words of a block. */
+/** A take whose blocks are frozen until their words change. */
 
 import { trackKeys } from "./tracks";
-import { type Project, type Segment, type Take, NOTHING_ASKED, length, newId, round, segment, toFrame } from "./model";
+import { type Project, type Segment, type Take, NO_CONSTRAINTS, length, newId, round, segment, toFrame } from "./model";
 
-/** The project with a take that nothing draws again. */
-export function settled(project: Project, take: Take): Project {
+/** The project with a take, all of it frozen. */
+export function withFixedTake(project: Project, take: Take): Project {
   const frozen = [[0, Math.max(take.seconds, length(project))] as const];
   const kept = { ...take, tracks: trackKeys(project) };
   return { ...project, base: kept, only: null, takes: [kept], kept: 0, frozen, drawn: "[]", count: 1 };
@@ -16,17 +16,20 @@ export function withMotion(project: Project, take: Take, segments: readonly Segm
   const total = segments.reduce((sum, one) => sum + one.seconds, 0);
   const rest = { ...last, seconds: Math.max(round(last.seconds + take.seconds - total), 0.2) };
   const fitted = [...segments.slice(0, -1), rest];
-  return settled({ ...project, people: [NOTHING_ASKED], reactTo: null, given: null, segments: fitted }, take);
+  return withFixedTake({ ...project, people: [NO_CONSTRAINTS], reactTo: null, given: null, segments: fitted }, take);
 }
 
-/** A take that went on is as long as its blocks and one without words. */
-export function continued(project: Project, take: Take): Project {
+/** The project with a take that continues its motion: one more block without words for what is longer. */
+export function withContinuedTake(project: Project, take: Take): Project {
   const tail = round(toFrame(take.seconds - length(project)));
-  return settled(tail >= 0.2 ? { ...project, segments: [...project.segments, segment("", tail)] } : project, take);
+  return withFixedTake(
+    tail >= 0.2 ? { ...project, segments: [...project.segments, segment("", tail)] } : project,
+    take,
+  );
 }
 
 /** A long clip as blocks of at most ten seconds, so that words can change a part of it. */
-export function pieces(name: string, seconds: number): Segment[] {
+export function blocksOfClip(name: string, seconds: number): Segment[] {
   const count = Math.max(Math.ceil(seconds / 10), 1);
   const part = round(toFrame(seconds / count));
   return Array.from({ length: count }, (_, index) => ({

@@ -11,9 +11,9 @@ from motionloom.motion import Motion
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import predict as task
-from motionloom.tasks.held import given
+from motionloom.tasks.held_parts import prepare_hold
 from motionloom.tasks.predict import predict, predict_pieces
-from motionloom.tasks.splice import carried, concatenated, overlaid, standing
+from motionloom.tasks.splice import concatenate, ground_pose_at, move_rigidly, overlay
 from motionloom.tasks.windows import Past
 from tests.tasks.small_predictor import small_predictor
 from tests.tasks.test_edit import floating, person, rig
@@ -61,7 +61,9 @@ def _on_rig(motion: Motion) -> np.ndarray:
 
 def test_the_way_of_an_aligned_source_is_taken_and_goes_on_where_the_past_ends() -> None:
     made = future(held("root"))
-    steps = turned(np.diff(SOURCE.root[:24], axis=0), standing(PAST, 29).facing - standing(SOURCE, 0).facing)
+    steps = turned(
+        np.diff(SOURCE.root[:24], axis=0), ground_pose_at(PAST, 29).facing - ground_pose_at(SOURCE, 0).facing
+    )
     np.testing.assert_allclose(np.diff(made.root, axis=0), steps, atol=1e-9)
     np.testing.assert_allclose(made.root[:, 1], SOURCE.root[:24, 1], atol=1e-12)
     first = (made.root[0] - PAST.root[-1])[[0, 2]]
@@ -84,7 +86,7 @@ def test_a_part_that_is_held_for_a_while_is_led_there_and_back() -> None:
     assert inside.sum() == 7
     same = (made.rotations[:, joints] == SOURCE.rotations[:24, joints]).all((1, 2))
     assert np.array_equal(same, inside)
-    ready = given(PREDICTOR, Past.of(PREDICTOR, PAST), held("left_arm", spans=spans), 0.8)
+    ready = prepare_hold(PREDICTOR, Past.of(PREDICTOR, PAST), held("left_arm", spans=spans), 0.8)
     assert ready is not None
     share = ready.joints[:24, 16]
     assert np.array_equal(share == 1, inside)
@@ -98,7 +100,7 @@ def test_what_is_held_in_a_later_piece_is_the_sources_of_that_moment(monkeypatch
     _, *pieces = predict_pieces(PREDICTOR, PAST, seconds=1.6, steps=1, hold=hold)
     assert [len(piece) for piece in pieces] == [30, 18]
     times, joints = np.arange(1, 49) / 30, sorted(SMPL22.resolve(["left_arm"]))
-    same = (concatenated(*pieces).rotations[:, joints] == SOURCE.rotations[:48, joints]).all((1, 2))
+    same = (concatenate(*pieces).rotations[:, joints] == SOURCE.rotations[:48, joints]).all((1, 2))
     assert np.array_equal(same, (times > 0.8 - 1e-9) & (times < 1.4 + 1e-9))
 
 
@@ -106,7 +108,7 @@ def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:
     made = future(held("left_arm", source=SOURCE.frames(0, 12)))
     joints = sorted(SMPL22.resolve(["left_arm"]))
     assert np.array_equal(made.rotations[:12, joints], SOURCE.rotations[:12, joints])
-    ready = given(PREDICTOR, Past.of(PREDICTOR, PAST), held("left_arm", source=SOURCE.frames(0, 12)), 0.8)
+    ready = prepare_hold(PREDICTOR, Past.of(PREDICTOR, PAST), held("left_arm", source=SOURCE.frames(0, 12)), 0.8)
     assert ready is not None
     share = np.append(ready.joints[:, 16], 0)
     assert (share[:12] == 1).all()
@@ -125,7 +127,7 @@ def test_what_is_held_is_shown_to_the_network_and_changes_the_free_joints() -> N
 
 def test_the_network_sees_the_source_at_its_own_moments_from_the_first_predicted_frame_on() -> None:
     after = person(3.0, 60.0).frames(60, 150)
-    ready = given(
+    ready = prepare_hold(
         PREDICTOR,
         Past.of(PREDICTOR, person(1.0, 60.0)),
         held("left_arm", "root", source=after, spans=((0.0, 0.5),)),
@@ -145,10 +147,10 @@ def test_the_network_sees_the_source_at_its_own_moments_from_the_first_predicted
 
 
 def test_parts_laid_over_a_motion_are_exact_at_weight_one_and_nothing_at_none() -> None:
-    one, other = PAST, carried(SOURCE, rot.IDENTITY, np.zeros(3), np.ones(3)).frames(0, 30)
+    one, other = PAST, move_rigidly(SOURCE, rot.IDENTITY, np.zeros(3), np.ones(3)).frames(0, 30)
     joints = np.zeros((30, 22))
     joints[5:10, 3], joints[10:, 3] = 0.5, 1
-    made = overlaid(one, other, joints, joints[:, 3])
+    made = overlay(one, other, joints, joints[:, 3])
     assert np.array_equal(made.rotations[:5], one.rotations[:5])
     assert np.array_equal(made.rotations[10:, 3], other.rotations[10:, 3])
     assert np.array_equal(made.root[10:], other.root[10:])

@@ -19,7 +19,7 @@ from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.onto import onto, place_of, with_place
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.splice import Kept, carried_level, kept_parts, splice, standing
+from motionloom.tasks.splice import KeptParts, ground_pose_at, kept_parts, move_on_floor, splice
 
 Span = tuple[float, float]
 
@@ -29,7 +29,7 @@ PARTS = ("root", "root_horizontal", *SMPL22.groups, *SMPL22.names)
 
 
 @dataclass(frozen=True)
-class Spanned:
+class SpanChange:
     """A change of some time of a clip."""
 
     spans: Sequence[Span] = ()
@@ -57,7 +57,7 @@ class Spanned:
 
 
 @dataclass(frozen=True, eq=False)
-class Lay(Spanned):
+class Overlay(SpanChange):
     """Parts that do what they do in another clip, from its beginning on, in each stretch."""
 
     source: Motion | None = None
@@ -74,12 +74,12 @@ class Lay(Spanned):
         source = self.source.resample(clip.fps)
         for first, last in self.frames(clip):
             count = min(last - first, len(source))
-            clip = _laid(clip, source.frames(0, count), first, kept_joints(clip, self.keep))
+            clip = _overlay_stretch(clip, source.frames(0, count), first, kept_parts_of(clip, self.keep))
         return clip
 
 
 @dataclass(frozen=True, eq=False)
-class Look(Spanned):
+class Look(SpanChange):
     """A head that looks at a place, or at places."""
 
     at: NDArray[np.float64] | None = None
@@ -98,7 +98,7 @@ class Look(Spanned):
 
 
 @dataclass(frozen=True, eq=False)
-class Nod(Spanned):
+class Nod(SpanChange):
     """A head that nods, is shaken or looks aside in each stretch, from where it is."""
 
     move: HeadMove | None = None
@@ -114,7 +114,7 @@ class Nod(Spanned):
 
 
 @dataclass(frozen=True, eq=False)
-class Smooth(Spanned):
+class Smooth(SpanChange):
     """Joints and the root without what is quicker than some seconds, in each stretch."""
 
     seconds: float = 0.2
@@ -128,18 +128,18 @@ class Smooth(Spanned):
 
     def apply(self, sampler: Any, clip: Motion, seed: int) -> Motion:
         """The clip, smoothed; feet that stood still stand still, if the sampler keeps them and the legs do not stay."""
-        kept, width = kept_joints(clip, self.keep), self.seconds * clip.fps / 2
-        turns = low_passed(rot.unroll(clip.rotations).reshape(len(clip), -1), width).reshape(clip.rotations.shape)
-        made = with_place(replace(clip, rotations=rot.normalize(turns)), low_passed(place_of(clip), width))
+        kept, width = kept_parts_of(clip, self.keep), self.seconds * clip.fps / 2
+        turns = gaussian_smooth(rot.unroll(clip.rotations).reshape(len(clip), -1), width).reshape(clip.rotations.shape)
+        smoothed = with_place(replace(clip, rotations=rot.normalize(turns)), gaussian_smooth(place_of(clip), width))
         if sampler.foot_lock and not joints_of(self.keep).issuperset(SMPL22.groups["lower_body"]):
             still = planted_feet(to_smpl22(clip).positions(), clip.fps)
-            made = onto(clean_feet(to_smpl22(made), contacts=still), made)
+            smoothed = onto(clean_feet(to_smpl22(smoothed), contacts=still), smoothed)
         for first, last in self.frames(clip):
-            clip = splice(clip, made, first, last=last, kept=kept)
+            clip = splice(clip, smoothed, first, last=last, kept=kept)
         return clip
 
 
-def low_passed(values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+def gaussian_smooth(values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
     """(frames, channels) smoothed along time by a Gaussian of ``width`` frames; both ends go on as their mirror image.
 
     The mirror image is about the end itself, so that a steady slope stays one.
@@ -164,24 +164,24 @@ def joints_of(keep: Sequence[str]) -> frozenset[int]:
     return frozenset(SMPL22.resolve(name for name in keep if name not in ("root", "root_horizontal")))
 
 
-def only_head(keep: Sequence[str]) -> bool:
+def is_only_head_free(keep: Sequence[str]) -> bool:
     """Whether everything stays but head and neck, of which the text says what they do; errors as of `check_parts`."""
     check_parts(keep)
     return not set(range(len(SMPL22))) - joints_of(keep) - set(SMPL22.groups["head_neck"])
 
 
-def kept_joints(clip: Motion, keep: Sequence[str]) -> Kept:
+def kept_parts_of(clip: Motion, keep: Sequence[str]) -> KeptParts:
     """The kept parts on the clip's own skeleton."""
     whole, level = "root" in keep, "root" in keep or "root_horizontal" in keep
     return kept_parts(clip.skeleton, joints_of(keep), np.array([level, whole, level]))
 
 
-def _laid(clip: Motion, source: Motion, first: int, kept: Kept) -> Motion:
+def _overlay_stretch(clip: Motion, source: Motion, first: int, kept: KeptParts) -> Motion:
     last = first + len(source)
     there = clip.frames(first, last)
     piece = source if source.skeleton == clip.skeleton else onto(to_smpl22(source), there)
-    piece = carried_level(piece, standing(piece, 0), standing(there, 0))
+    piece = move_on_floor(piece, ground_pose_at(piece, 0), ground_pose_at(there, 0))
     # Outside it is as at its ends: from how far that is from the clip, the splice eases in and out.
     at = np.clip(np.arange(len(clip)) - first, 0, len(piece) - 1)
-    made = with_place(replace(clip, rotations=piece.rotations[at]), place_of(piece)[at])
-    return splice(clip, made, first, last=last, kept=kept)
+    extended = with_place(replace(clip, rotations=piece.rotations[at]), place_of(piece)[at])
+    return splice(clip, extended, first, last=last, kept=kept)
