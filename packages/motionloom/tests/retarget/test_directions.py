@@ -115,7 +115,7 @@ WITHOUT_COLLARS = ("animated_drawings", "quaternius_robot")
 
 @pytest.mark.parametrize(("path", "name", "fps"), TAKES, ids=[name for _, name, _ in TAKES])
 def test_shoulders_that_rest_are_where_a_persons_are(path: str, name: str, fps: float) -> None:
-    """Of fitted people (accad, cmu, ui_prmd on the 22 joints) they are 0.11 to 0.18 lengths of the spine below the neck."""
+    """Of fitted people (accad, cmu, ui_prmd) they are 0.11 to 0.18 lengths of the spine below the neck."""
     place = shared(path)
     motion = load(place, fps=fps) if place.suffix == ".amc" else load(place)
     seen = shoulders_below(to_smpl22(motion).positions())
