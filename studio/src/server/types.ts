@@ -9,7 +9,7 @@ export interface GenerateRequest {
   readonly levels?: boolean | number;
   /** what the person does, such as 'a person walks' */
   readonly prompt: string;
-  /** length of each motion: 5, or of several actions in a sentence what they take, in seconds */
+  /** length of each motion: 5, on stairs 4, or of several actions in a sentence what they take, in seconds */
   readonly seconds?: number;
   /** do not part 'A, then B' into actions that follow each other */
   readonly as_one?: boolean;

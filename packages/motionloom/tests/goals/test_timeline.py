@@ -14,7 +14,7 @@ from motionloom import io
 from motionloom.errors import MotionloomError
 from motionloom.goals.schemas import timeline_schema
 from motionloom.goals.segment import Segment
-from motionloom.goals.timeline import plain_timeline, read_timeline, timeline_from
+from motionloom.goals.timeline import plain_timeline, read_timeline, timeline_from, timeline_of
 from motionloom.io import lined_yaml
 from motionloom.motion import Motion
 from motionloom.requests.fields import specs
@@ -376,3 +376,18 @@ def test_numbers_beyond_all_bounds_are_refused_wherever_they_are(tmp_path):
             timeline_from(value, folder=tmp_path)
     with pytest.raises(MotionloomError, match="has seconds a number beyond all bounds; give a number, at most"):
         Segment("a person walks", 10**400)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("a man walks up a flight of stairs", 4.0),
+        ("someone goes UPSTAIRS", 4.0),
+        ("down the staircase", 4.0),
+        ("a person stares at a star", 5.0),
+        ("a person walks forward", 5.0),
+    ],
+)
+def test_a_sentence_about_stairs_is_as_long_as_people_were_recorded_there(text: str, seconds: float) -> None:
+    assert [segment.seconds for segment in timeline_of(text).segments] == [seconds]
+    assert timeline_of(text, 6.0).segments[0].seconds == 6.0

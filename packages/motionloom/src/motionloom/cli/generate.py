@@ -34,12 +34,11 @@ from motionloom.kinematics.stairs import stairs
 from motionloom.motion import Motion
 from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import SOLVER
+from motionloom.requests.timeline import usual_seconds
 from motionloom.tasks.run import Models, Plan, run_each
 from motionloom.tasks.worded import Worded
 from motionloom.weights.prior import Prior
 
-SECONDS = 5.0
-"""Length of one action where nothing is said of it."""
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
 
@@ -87,7 +86,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
                 "--json has their places",
                 file=sys.stderr,
             )
-    length = SECONDS if arguments.seconds is None else arguments.seconds
+    length = usual_seconds(prompts[0]) if arguments.seconds is None else arguments.seconds
     about = {
         "motions": motions,
         "seconds": length,

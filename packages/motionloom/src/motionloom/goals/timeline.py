@@ -19,7 +19,7 @@ from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, re
 from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
-from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
+from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys, usual_seconds
 
 if TYPE_CHECKING:
     from motionloom.goals.amounts import Amount
@@ -150,9 +150,9 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
     """One sentence as segments, one for each action that follows another (`motionloom.goals.sequence`).
 
     seconds: of the whole, shared out as the actions' own lengths are; None: those lengths. A sentence that says one
-    thing, or several at once, is one segment of 5 s. amounts: numbers with units in the words become lengths and goals
-    of their segments (`motionloom.goals.amounts`). metre: as of `goal_file.read_goal`, of metres in the words. Raises
-    `MotionloomError` for an impossible request.
+    thing, or several at once, is one segment of `usual_seconds`. amounts: numbers with units in the words become
+    lengths and goals of their segments (`motionloom.goals.amounts`). metre: as of `goal_file.read_goal`, of metres in
+    the words. Raises `MotionloomError` for an impossible request.
     """
     from motionloom.goals.sequence import split_actions
 
@@ -212,7 +212,7 @@ def _timeline_of_parts(text: str, parts: Sequence[Part], seconds: float | None) 
     from motionloom.goals.sequence import lengths
 
     if len(parts) == 1:
-        return plain_timeline([text], seconds=SECONDS if seconds is None else seconds)
+        return plain_timeline([text], seconds=usual_seconds(text) if seconds is None else seconds)
     if seconds is not None and not SHORTEST * len(parts) <= seconds <= LONGEST:
         raise MotionloomError(
             f"{len(parts)} actions one after the other take {SHORTEST * len(parts):g} to {LONGEST:g} seconds; got "

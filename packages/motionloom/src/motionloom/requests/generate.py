@@ -12,7 +12,9 @@ class Generate(Finish, Adapted):
     """Make motion of one person from a sentence, such as 'a person walks forward and waves'."""
 
     prompt: str = prompt(needed=True)
-    seconds: float | None = seconds("length of each motion: 5, or of several actions in a sentence what they take")
+    seconds: float | None = seconds(
+        "length of each motion: 5, on stairs 4, or of several actions in a sentence what they take"
+    )
     as_one: bool = declare("flag", "do not part 'A, then B' into actions that follow each other", False)
     literal: bool = declare("flag", "do not read numbers as goals: '3 meters', 'turns left 90 degrees'", False)
     sampling: Sampling = group(Sampling(count=1), *SAMPLED, "solver")

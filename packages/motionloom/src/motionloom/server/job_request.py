@@ -15,7 +15,7 @@ from motionloom.goals.timeline import Timeline, timeline_of
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.reading import read, resolve_sampling
 from motionloom.requests.tasks import REQUESTS
-from motionloom.requests.timeline import SECONDS
+from motionloom.requests.timeline import SECONDS, usual_seconds
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.timelines import timeline_from_json
@@ -139,7 +139,7 @@ class _Reader:
 
     def generate(self, found: JobRequest) -> JobRequest:
         values = found.values
-        seconds = SECONDS if values.seconds is None else values.seconds
+        seconds = usual_seconds(values.prompt) if values.seconds is None else values.seconds
         found = replace(found, seconds=seconds)
         if values.as_one or seconds < 0.2:
             return found

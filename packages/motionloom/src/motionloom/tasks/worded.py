@@ -24,6 +24,7 @@ from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED, SOLVER, Sampling, Settings
+from motionloom.requests.timeline import usual_seconds
 from motionloom.tasks.control import control
 from motionloom.tasks.long import compose
 from motionloom.tasks.sampling import Progress
@@ -119,7 +120,7 @@ def read(
     where one part has a number that is read. amounts: read numbers. metre: as of `timeline_of`. Weights that
     make no long motion get the sentence as it is. Raises `MotionloomError` for an impossible request.
     """
-    whole = goal_timeline.single_segment(text, goal_timeline.SECONDS if seconds is None else seconds)
+    whole = goal_timeline.single_segment(text, usual_seconds(text) if seconds is None else seconds)
     frames_in(whole.segments[0].seconds, prior.fps)
     if (len(prior.mean), prior.fps) != (WIDTH, FPS) or whole.segments[0].seconds < goal_timeline.SHORTEST:
         return whole
@@ -154,7 +155,7 @@ def generate_worded(
         raise MotionloomError("nothing to make: no prompt; give at least one")
     check_prompts(texts)
     timelines = [
-        goal_timeline.single_segment(text, goal_timeline.SECONDS if length is None else length)
+        goal_timeline.single_segment(text, usual_seconds(text) if length is None else length)
         if literal
         else read(prior, text, length, parted=False)
         for text, length in zip(texts, lengths, strict=True)
