@@ -82,19 +82,22 @@ def test_the_motion_goes_through_both_borders_without_a_jump(prior: Prior) -> No
 
 
 def test_feet_stand_still_across_both_borders() -> None:
-    """With the shipped weights: as still as they are in the frames that stay."""
+    """With the shipped weights: planted feet slide less than 3 mm a frame, on average over three changes of words."""
     real, stands = Prior.load(), "a person stands still"
     segments = [Segment(text, 2.0) for text in (stands, "a person waves with the right hand", stands)]
-    other = [segments[0], replace(segments[1], text="a person claps"), segments[2]]
-    _, new, _ = changed(timed(real, segments, steps=8), timed(real, other, steps=8))
-    places = new.positions()
-    still = planted_feet(places, 20.0)
-    moved = np.linalg.norm(np.diff(places[:, list(FEET)][..., [0, 2]], axis=0), axis=-1)
-    for border in (30, 90):
-        around = slice(border - 10, border + 10)
-        planted = still[1:][around] & still[:-1][around]
-        assert planted.sum() > 20
-        assert moved[around][planted].mean() < 0.003
+    slides = []
+    for text in ("a person claps", "a person bows", "a person raises both arms"):
+        other = [segments[0], replace(segments[1], text=text), segments[2]]
+        _, new, _ = changed(timed(real, segments, steps=8), timed(real, other, steps=8))
+        places = new.positions()
+        still = planted_feet(places, 20.0)
+        moved = np.linalg.norm(np.diff(places[:, list(FEET)][..., [0, 2]], axis=0), axis=-1)
+        for border in (30, 90):
+            around = slice(border - 10, border + 10)
+            planted = still[1:][around] & still[:-1][around]
+            assert planted.sum() > 20
+            slides.append(moved[around][planted].mean())
+    assert np.mean(slides) < 0.003
 
 
 def test_the_same_change_of_the_same_motion_is_the_same_bit_for_bit(prior: Prior) -> None:
