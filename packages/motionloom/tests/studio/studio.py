@@ -172,11 +172,16 @@ class Studio:
         return np.stack([array.reshape(-1, 22, 3) for array in arrays])
 
     def picture(self) -> np.ndarray:
-        """The stage as (height, width, 3) numbers of 0 to 255."""
+        """The stage as (height, width, 3) numbers of 0 to 255, once it no longer changes; while it plays, after 2 s."""
         from PIL import Image
 
-        self.page.wait_for_timeout(400)
-        return np.asarray(Image.open(io.BytesIO(self.page.locator("#canvas").screenshot())).convert("RGB")).astype(int)
+        shots = [b""]
+        for _ in range(6):
+            self.page.wait_for_timeout(400)
+            shots.append(self.page.locator("#canvas").screenshot())
+            if shots[-1] == shots[-2]:
+                break
+        return np.asarray(Image.open(io.BytesIO(shots[-1])).convert("RGB")).astype(int)
 
     def download(self, *keys: str) -> bytes:
         """The file that keys make the page write."""

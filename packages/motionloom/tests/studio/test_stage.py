@@ -107,7 +107,7 @@ def test_front_and_side_are_beside_the_main_picture(studio: Studio):
 
 def test_who_climbs_has_steps_below(studio: Studio):
     assert studio.page.locator("#canvas").get_attribute("data-steps") == "0"
-    studio.open(("a person climbs stairs", 5.0))
+    studio.open(("a person climbs stairs", 4.0))
     assert int(studio.page.locator("#canvas").get_attribute("data-steps") or 0) >= 2
     motion = studio.motion()[0]
     assert motion[:, :, 1].min(axis=1).max() > 0.15, "the person goes up"
