@@ -64,7 +64,7 @@ def three(files: list[Path], folder: Path) -> list[dict[str, np.ndarray]]:
 
 def assimp(files: list[Path], library: Path) -> list[dict[str, np.ndarray]]:
     """The same from assimp's animation channels, posed along its tree of nodes."""
-    from pyassimp import structs
+    from pyassimp import structs  # pyright: ignore[reportMissingImports]
 
     dll = ctypes.CDLL(str(library))
     dll.aiImportFile.restype = ctypes.POINTER(structs.Scene)

@@ -14,7 +14,7 @@ import json
 import random
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,7 @@ NEAR = 20
 
 def words(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     """Eight words of 4 s each in random order, said live and composed: obedience, slide, jerk, speeds of joints."""
-    found: dict[str, list[tuple[list[str], np.ndarray]]] = {"live": [], "compose": []}
+    found: dict[str, list[tuple[Sequence[str], np.ndarray]]] = {"live": [], "compose": []}
     for seed in range(seeds):
         order = random.Random(seed).sample(WORDS, len(WORDS))
         found["live"].append((order, _said(prior, order, seed)))
@@ -80,7 +80,7 @@ def words(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     return result
 
 
-def _said(prior: Prior, order: list[str], seed: int) -> np.ndarray:
+def _said(prior: Prior, order: Sequence[str], seed: int) -> np.ndarray:
     live, frames = Live(prior, seed=seed), []
     for name in order:
         live.say(check(name).prompt)
@@ -88,7 +88,7 @@ def _said(prior: Prior, order: list[str], seed: int) -> np.ndarray:
     return motion_of(frames, FPS).positions()
 
 
-def _obeyed(name: str, order: list[str], places: np.ndarray, settled: float = 0.0) -> bool:
+def _obeyed(name: str, order: Sequence[str], places: np.ndarray, settled: float = 0.0) -> bool:
     """Whether a word is obeyed in its seconds but the first ``settled`` ones; a circle is judged by its pace."""
     count, skipped = round(SECONDS * FPS), round(settled * FPS)
     begin = order.index(name) * count

@@ -236,7 +236,7 @@ def measure(action: Action, rows: list[dict[str, Any]], prior: Prior, arguments:
     before, first = obeyed(prior, action, arguments.seeds)
     began = time.perf_counter()
     settings = {"steps": arguments.steps} if arguments.steps else {}
-    adapter = teach(prior, examples, Lesson(action.name, "only to measure", **settings), say=print)
+    adapter = teach(prior, examples, Lesson(name=action.name, licence="only to measure", **settings), say=print)
     seconds = time.perf_counter() - began
     place = adapter.save(arguments.out / f"{action.name}.safetensors")
     taught = adapt(prior, [(adapter, 1.0)])
@@ -260,7 +260,7 @@ def measure(action: Action, rows: list[dict[str, Any]], prior: Prior, arguments:
 
 def main() -> None:
     """Measure what the line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("packs", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("out/teach"))
     parser.add_argument("--only", default="", help="names of actions, with commas between")

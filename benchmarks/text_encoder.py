@@ -27,11 +27,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
+from safetensors.numpy import load_file
 from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom.runtime.text.minilm import MiniLM
+from motionloom_train.modules import text_encoder
 from motionloom_train.nets.text.hub import open_pretrained
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -255,10 +256,10 @@ def with_means(table: dict[str, Any]) -> dict[str, Any]:
     return {"pairs": sum(row["test_pairs"] for row in table.values()), "means": means, "families": table}
 
 
-def speed(tensors: dict[str, Tensor]) -> dict[str, float]:
+def speed(tensors: dict[str, np.ndarray]) -> dict[str, float]:
     """Seconds to unpack the encoder and to encode one new sentence, on as many threads as torch was given."""
     start = time.perf_counter()
-    encoder = MiniLM.from_tensors(tensors)
+    encoder = text_encoder(tensors)
     load = time.perf_counter() - start
     encoder.encode("warm up")
     times = []
@@ -285,7 +286,7 @@ def main() -> None:
     options = parser.parse_args()
     warnings.simplefilter("ignore")  # a few captions are truncated; fidelity counts them
     tensors = load_file(options.encoder)
-    encoder = MiniLM.from_tensors(tensors)
+    encoder = text_encoder(tensors)
     encoders = {"teacher": teacher(find_source()), "ours": student(encoder)}
     records = read_records(options.captions)
     before = json.loads(options.out.read_text(encoding="utf-8")) if options.out.exists() else {}

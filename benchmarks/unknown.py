@@ -27,7 +27,7 @@ def parts(prompts: Sequence[str]) -> list[str]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("set", nargs="?")
     parser.add_argument("--weights", default="default")
     arguments = parser.parse_args()

