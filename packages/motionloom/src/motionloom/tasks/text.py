@@ -86,7 +86,7 @@ def generate(
         prior: the weights, from `Prior.load`.
         prompts: what the person does, one text or several.
         seconds: length, one for all or one per prompt, at the prior's frame rate (20 per second; BABEL's 30); None:
-            what numbers in the words need, or 5.
+            what numbers in the words need, or 5 (on stairs 4).
         literal: leave numbers in the words to the network. Otherwise "3 meters", "turns left 90 degrees", "jumps twice"
             are kept; `tasks.worded.generate_worded` says what was read and what was drawn of it.
         foot_lock: keep planted feet still, and feet above the floor.
