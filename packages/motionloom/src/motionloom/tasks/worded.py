@@ -116,9 +116,9 @@ def read(
 ) -> Timeline:
     """A sentence as a timeline: its numbers as goals and lengths, its actions as segments.
 
-    seconds: of the whole; None: what the words say, or `usual_seconds`. parted: part what follows each other; otherwise it is parted
-    where one part has a number that is read. amounts: read numbers. metre: as of `timeline_of`. Weights that
-    make no long motion get the sentence as it is. Raises `MotionloomError` for an impossible request.
+    seconds: of the whole; None: what the words say, or `usual_seconds`. parted: part what follows each other;
+    otherwise it is parted where one part has a number that is read. amounts: read numbers. metre: as of `timeline_of`.
+    Weights that make no long motion get the sentence as it is. Raises `MotionloomError` for an impossible request.
     """
     whole = goal_timeline.single_segment(text, usual_seconds(text) if seconds is None else seconds)
     frames_in(whole.segments[0].seconds, prior.fps)
