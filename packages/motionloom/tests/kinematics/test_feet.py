@@ -107,10 +107,24 @@ def test_feet_come_out_of_the_floor() -> None:
     assert depth(clean_feet(motion, floor=-0.5)) == pytest.approx(depth(motion), abs=1e-3)
 
 
-def test_whoever_stands_still_is_left_alone() -> None:
+def test_whoever_stands_still_is_left_alone_but_for_toes_off_the_floor() -> None:
     motion = slider(speed=0.0).frames(0, 1)
     still = replace(motion, root=motion.root.repeat(30, 0), rotations=motion.rotations.repeat(30, 0))
-    np.testing.assert_allclose(clean_feet(still).positions(), still.positions(), atol=1e-4)
+    toes = [FEET[1], FEET[3]]
+    np.testing.assert_allclose(still.positions()[0, toes, 1], [0, 0.0016], atol=1e-4)  # one leg is shorter
+    clean = clean_feet(still).positions()
+    np.testing.assert_allclose(clean[:, toes, 1], 0, atol=1e-4)
+    np.testing.assert_allclose(clean, still.positions(), atol=0.0025)
+
+
+@pytest.mark.parametrize(("height", "left"), [(0.008, 0.0), (-0.02, 0.0), (0.045, 0.045)])
+def test_toes_near_the_floor_rest_on_it(height: float, left: float) -> None:
+    """Of somebody who marches over or under the floor; who is higher may stand on something."""
+    motion = slider(sink=-height)
+    planted = planted_feet(motion.positions(), FPS)
+    places = clean_feet(motion).positions()
+    toes = [np.median(places[planted[:, foot], FEET[foot], 1]) for foot in (1, 3)]
+    np.testing.assert_allclose(toes, left, atol=0.003)
 
 
 def test_feet_in_the_air_are_left_alone() -> None:

@@ -35,6 +35,12 @@ _DRIFT = 0.12
 """Metres: a planted foot that strays further from the middle of its stance means to move; the stance is split."""
 _SUNK = 0.002
 """Metres under the floor that are left, as in recordings: lifting every millimetre would leave people afloat."""
+_NEAR = 0.01
+"""Metres: somebody whose toes rest this near to the floor rests on it, and who is three times as far does not."""
+_RESTING = (0.03, 0.2)
+"""Metres from there, and metres per second up or down, below which planted toes are brought there."""
+_LIFT_EASE = 0.05
+"""Seconds over which a foot is lifted out of the floor; longer would lift a stance for the toes that leave it."""
 _LENGTHS = SMPL22.bone_lengths()
 
 
@@ -55,6 +61,8 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         return motion
     places = motion.positions()
     planted = planted_feet(places, motion.fps, contacts=contacts)
+    level = toe_level(places, motion.fps) - floor
+    height = floor + level - np.clip(level, -_NEAR, _NEAR) * np.clip((3 * _NEAR - abs(level)) / (2 * _NEAR), 0, 1)
     targets, directions = places[:, [limb.end for limb in LIMBS[:2]]].copy(), np.empty((len(motion), 2, 3))
     free = _coming(len(motion), shown, max(1, round(EASE * motion.fps)))
     for i in (0, 1):
@@ -64,12 +72,13 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         directions[:, i] = _steady_direction(foot, flags[:, 0] & flags[:, 1], motion.fps, shown)
         tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
         since = max(shown - 1, 0)
-        moved = correction(
-            places[since:, ankle], (places[:, ankle] + tip)[since:], flags[since:], motion.fps, held=shown > 0
-        )
+        ends = places[since:, ankle] - [0, height, 0]
+        moved = correction(ends, ends + tip[since:], flags[since:], motion.fps, held=shown > 0, level=True)
         targets[since:, i] += moved
+        stretched = envelope(_overreach(places, targets, i), round(_LIFT_EASE * motion.fps))
+        targets[since:, i, 1] += np.minimum(stretched[since:], -np.minimum(moved[:, 1], 0))
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
-        targets[:, i, 1] += free * envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
+        targets[:, i, 1] += free * envelope((below - _SUNK).clip(0), round(_LIFT_EASE * motion.fps))
     down = free * _root_drop(places, targets, motion.fps)
     return _with_legs(motion, places - down[:, None, None] * [0, 1, 0], targets, directions)
 
@@ -81,10 +90,7 @@ def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | No
     """
     feet = np.asarray(positions)[:, list(FEET)]
     speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * fps
-    height = feet[..., 1]
-    resting = height[:, [1, 3]][speed[:, [1, 3]] < _SLOW]
-    level = np.percentile(resting, 30) if resting.size else height.min()
-    low = height < level + _LOW
+    low = feet[..., 1] < toe_level(positions, fps) + _LOW
     if contacts is None:
         may, sure = low & (speed < _STILL_SLOW), low & (speed < _SLOW)
     else:
@@ -97,6 +103,13 @@ def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | No
         for start, stop in _joined(runs, gap):
             result[start:stop, k] = stop - start >= least
     return result
+
+
+def toe_level(positions: np.ndarray, fps: float) -> float:
+    """Height in metres at which toes rest in ``positions`` (frames, 22, 3) metres; that of the lowest where none do."""
+    feet = np.asarray(positions)[:, list(FEET)]
+    resting = np.linalg.norm(np.gradient(feet[:, [1, 3]], axis=0), axis=-1) * fps < _SLOW
+    return float(np.percentile(feet[:, [1, 3], 1][resting], 30) if resting.any() else feet[..., 1].min())
 
 
 def _told(contacts: np.ndarray, frames: int) -> Flags:
@@ -146,19 +159,25 @@ def _steady_direction(foot: Array, flat: Flags, fps: float, shown: int = 0) -> A
     return result / np.linalg.norm(result, axis=-1, keepdims=True).clip(1e-9)
 
 
-def correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bool = False) -> Array:
+def correction(
+    ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bool = False, level: bool = False
+) -> Array:
     """(frames, 3) metres to add to the foot so that whatever is planted does not move; eased in and out.
 
-    ankle, toe: (frames, 3) metres; planted: (frames, 2) flags for the two. held: nothing is added to frame 0, which was
-    shown; stances that begin soon after it keep near where they begin.
+    ankle, toe: (frames, 3) metres above the floor; planted: (frames, 2) flags for the two. held: nothing is added to
+    frame 0, which was shown; stances that begin soon after it keep near where they begin. level: toes that rest near
+    the floor rest on it, as those of `motionloom.skeleton.SMPL22` do; else heights stay.
     """
     steps = np.zeros((len(ankle) - 1, 3))
     for place, flags in ((ankle, planted[:, 0]), (toe, planted[:, 1])):
         both = flags[1:] & flags[:-1]
         steps[both] = -np.diff(place, axis=0)[both]  # toes last: they are the pivot when the whole foot stands
-    steps[:, 1] = 0  # heights stay: a foot that begins to rise must not be held down
+    steps[:, 1] = 0
     ease = max(2, round(EASE * fps))
     pieces = list(_pieces(steps, planted[:, 0] | planted[:, 1], max(2, round(EASE * fps / 2))))
+    for start, path in pieces if level else ():
+        stance = slice(start, start + len(path))
+        path[:, 1] = _to_floor(toe[stance, 1], planted[stance, 1], fps)
     if held:
         pieces = [(start, path - max(0.0, 1 - start / ease) * path[0]) for start, path in pieces]
         if not pieces or pieces[0][0] > 0:
@@ -168,6 +187,13 @@ def correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bo
         result[start : start + len(values)] = values
     bridge(result, [(start, start + len(values)) for start, values in pieces], ease)
     return result
+
+
+def _to_floor(height: Array, planted: Flags, fps: float) -> Array:
+    """(frames,) metres to add in a stance whose toes are ``height`` above the floor; toes that begin to rise may."""
+    resting = planted & (np.abs(height) < _RESTING[0]) & (np.abs(np.gradient(height)) * fps < _RESTING[1])
+    frames = np.flatnonzero(resting)
+    return np.interp(np.arange(len(height)), frames, -height[frames]) if len(frames) else np.zeros(len(height))
 
 
 def _pieces(steps: Array, standing: Flags, hole: int) -> Iterator[tuple[int, Array]]:
@@ -233,17 +259,19 @@ def envelope(need: Array, radius: int) -> Array:
 
 
 def _root_drop(places: Array, targets: Array, fps: float) -> Array:
-    """(frames,) metres by which the root goes down so that no leg is stretched beyond what it was or 99.5 %."""
-    need = np.zeros(len(places))
-    for i, limb in enumerate(LIMBS[:2]):
-        full = _LENGTHS[limb.middle] + _LENGTHS[limb.end]
-        before = np.linalg.norm(places[:, limb.end] - places[:, limb.start], axis=-1)
-        most = np.maximum(before, 0.995 * full)
-        line = targets[:, i] - places[:, limb.start]
-        height = np.sqrt((most**2 - line[:, 0] ** 2 - line[:, 2] ** 2).clip(0))
-        far = np.linalg.norm(line, axis=-1) > most
-        need = np.maximum(need, np.where(far, -line[:, 1] - height, 0).clip(0, 0.05))
-    return envelope(need, round(0.15 * fps))
+    """(frames,) metres by which the root goes down so that no leg is stretched too far (`_overreach`)."""
+    need = np.maximum(*(_overreach(places, targets, i) for i in (0, 1)))
+    return envelope(need.clip(0, 0.05), round(0.15 * fps))
+
+
+def _overreach(places: Array, targets: Array, i: int) -> Array:
+    """(frames,) metres that an ankle's target is too low for a leg stretched as far as it was, or to 99.5 %."""
+    limb = LIMBS[i]
+    before = np.linalg.norm(places[:, limb.end] - places[:, limb.start], axis=-1)
+    most = np.maximum(before, 0.995 * (_LENGTHS[limb.middle] + _LENGTHS[limb.end]))
+    line = targets[:, i] - places[:, limb.start]
+    height = np.sqrt((most**2 - line[:, 0] ** 2 - line[:, 2] ** 2).clip(0))
+    return np.where(np.linalg.norm(line, axis=-1) > most, -line[:, 1] - height, 0).clip(0)
 
 
 def _with_legs(motion: Motion, places: Array, targets: Array, directions: Array) -> Motion:
