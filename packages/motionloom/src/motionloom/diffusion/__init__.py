@@ -5,7 +5,7 @@ Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `d
 
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
-from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, lerp, mix
+from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, lerp, mix, rising
 from .sampling import Snapshot, masked_noise, restart, row_noise, row_seed, run, sample
 from .schedule import (
     SCHEDULES,
@@ -62,6 +62,7 @@ __all__ = [
     "mix",
     "observe",
     "restart",
+    "rising",
     "row_noise",
     "row_seed",
     "run",

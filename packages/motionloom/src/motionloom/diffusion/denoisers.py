@@ -4,6 +4,7 @@ A denoiser answers E[x_0 | x_level]; everything it is conditioned on was bound b
 are the ways to bind and to edit:
 
     guide       u + s (c - u)                    classifier-free guidance (Ho & Salimans 2022), one network call
+    rising      s that grows where little noise is left
     inpaint     (1 - m) denoised + m known          hard (m is 0 or 1) and soft
     from_noise  (x - noise * e) / signal         a network that predicts the noise e
     blend       sum of w_i denoised_i            several models, e.g. DiffusionBlending
@@ -41,7 +42,7 @@ def guide(
     net: Callable[[State, int, C], State],
     cond: C,
     null: C,
-    scale: float | np.ndarray,
+    scale: Weight,
     *,
     join: Callable[[C, C], C] = join_rows,
 ) -> Denoiser:
@@ -50,9 +51,13 @@ def guide(
     `net(state, level, condition)` answers the clean data; `cond` and `null` hold one entry per row, with all that
     belongs to rows inside them (also lengths), because the network is shown (conditional rows, unconditional
     rows). `join` puts two conditions behind each other; it is called once, here. `scale` is a number or an array
-    (rows,). Where every scale is 1 only the conditional pass is made, where every scale is 0 only the
-    unconditional one; a row with scale 0 or 1 gets exactly that pass's answer beside any other rows.
+    (rows,), or either as a function of the level. Where every scale is 1 only the conditional pass is made, where
+    every scale is 0 only the unconditional one; a row with scale 0 or 1 gets exactly that pass's answer beside any
+    other rows.
     """
+    if callable(scale):
+        both = join(cond, null)
+        return lambda x, level: guide(net, cond, null, scale(level), join=lambda *_: both)(x, level)
     scales = np.asarray(scale, dtype=np.float64).reshape(-1)
     if not np.isfinite(scales).all():
         raise ValueError("the guidance scale must be finite")
@@ -69,6 +74,21 @@ def guide(
         return lerp(unconditional, conditional, s)
 
     return guided
+
+
+def rising(scale: float, levels: int, factor: float) -> Callable[[int], float]:
+    """A guidance scale by level: what it adds to 1 is ``factor`` times as much below a quarter of the ``levels``.
+
+    Above half of them it is ``scale``, in between it is interpolated; scales up to 1 stay as they are. What the motion
+    is has been decided before; how lively its details are has not (growing scales: Wang et al. 2024, *Analysis of
+    Classifier-Free Guidance Weight Schedulers*).
+    """
+
+    def at(level: int) -> float:
+        late = min(max(2 - 4 * level / levels, 0.0), 1.0)
+        return scale + max(scale - 1, 0.0) * (factor - 1) * late
+
+    return at
 
 
 def lerp(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """How motion is sampled: the part that the requests of every task share."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypedDict
@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from motionloom.diffusion import Schedule
 
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
-"""How motions are sampled unless asked otherwise (docs/decisions/0008)."""
+LATE_GUIDANCE = 2.5
+"""How motions are sampled unless asked otherwise (docs/decisions/0008); the last is the factor of `strength`."""
 BATCH = 8
 """Rows in one network call."""
 SOLVERS = ("ddpm", "ddim", "dpm2m", "dpm2m-sde")
@@ -59,7 +60,9 @@ class Sampling(Checked):
 
     steps: int = declare("whole", "network calls per motion: fewer is faster", STEPS, low=1, high=100_000)
     solver: str = declare("word", "how the noise is taken away", SOLVER, words=SOLVERS)
-    spacing: str = declare("word", "how the steps are spread over the noise levels", SPACING, words=SPACINGS)
+    spacing: str = declare(
+        "word", "how the steps are spread over the noise levels; on early ones, guidance rises", SPACING, words=SPACINGS
+    )
     guidance: float = declare(
         "number",
         "strength of the text: 0 ignores it",
@@ -112,6 +115,13 @@ class Sampling(Checked):
         all_of_them = levels(schedule, self.steps, spacing=self.spacing)
         least = max(1, round(all_of_them[0] * strength))
         return sorted({round(level * strength) for level in all_of_them} | {0, least}, reverse=True)
+
+    def strength(self, schedule: "Schedule", guidance: float | None = None) -> "Callable[[int], float]":
+        """The guidance, or another one, by noise level: with early spacing it rises towards the end (`rising`)."""
+        from motionloom.diffusion import rising
+
+        scale = self.guidance if guidance is None else guidance
+        return rising(scale, schedule.steps, LATE_GUIDANCE if self.spacing == "early" else 1)
 
     def seeds(self, count: int) -> list[int]:
         """The seeds of ``count`` motions of one person."""

@@ -144,7 +144,7 @@ def steered_features(
     def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
         if not nets:
             return corrected(denoise, [change] * len(batch.rows))
-        shown = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.guidance)
+        shown = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.strength(prior.schedule))
         return _conditioned(shown, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
@@ -159,7 +159,7 @@ def blended(
     mask: np.ndarray,
     *,
     weights: Sequence[Weight],
-    guidance: float,
+    guidance: Weight,
 ) -> Denoiser:
     """DiffusionBlending: networks guided by themselves, then their weighted sum; conditioned where they can be."""
     null = cond.null()

@@ -206,7 +206,7 @@ def duet_features(
     """
     chosen = PairSampling.of(sampling, settings)
     denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance, chosen.bodies, begin)
-    both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
+    both = (chain_rows(prior, one, chosen, None) for one in segments)
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
     states = sample_chain(
         prior,
@@ -414,5 +414,5 @@ class _PairDenoiser:
         lengths, level = (np.tile(np.repeat(each, 2), 2) for each in (frames, at))
         bound = stack_conditions([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
         conditional, unconditional = np.split(net(np.concatenate([x, x]), level, bound), 2)
-        scale = np.array([row.guidance for row in rows], x.dtype)[:, None, None]
+        scale = np.array([row.guidance(one) for row, one in zip(rows, np.repeat(at, 2))], x.dtype)[:, None, None]
         return lerp(unconditional, conditional, scale)

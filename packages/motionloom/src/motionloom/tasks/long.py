@@ -9,7 +9,7 @@ The published procedure and that of the paper are in `lab.papers.double_take`; d
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -58,7 +58,7 @@ class Row:
     after: int
     overlap: int
     """Frames shared with the next row."""
-    guidance: float
+    guidance: Callable[[int], float]
     cond: Bound
     null: Bound
     correct: Correction
@@ -184,7 +184,7 @@ def long_features(
     """
     chosen = Sampling.of(sampling, settings)
     denoise = partial(_denoise_rows, prior, chosen.levels(prior.schedule)[-2])
-    rows, each = chain_rows(prior, segments, chosen.guidance, past), None
+    rows, each = chain_rows(prior, segments, chosen, past), None
     if chosen.number() > 1:
         own = list(rows)
         rows, each = own * chosen.number(), len(own)
@@ -218,7 +218,7 @@ def _denoise_rows(
     return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
 
-def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[Row]:
+def chain_rows(prior: Prior, segments: Iterable[Segment], sampling: Sampling, past: "Past | None") -> Iterator[Row]:
     """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
     before, number = len(past.known) if past else 0, 0
     lead, trail, behind = (past.lead, past.trail, past.behind) if past else (0, 0, None)
@@ -244,7 +244,7 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past:
             edits.append(holding_correction(behind, prior, length, last=True))
         if segment.goal and not segment.goal.empty:
             edits.append(toward(segment.goal, prior, first=before + lead))
-        scale = guidance if segment.guidance is None else segment.guidance
+        scale = sampling.strength(prior.schedule, segment.guidance)
         correct = _chain_corrections(edits)
         yield Row(segment.text, frames, before, after, overlap, scale, bound, null, correct, own.net)
         before, segment, number, lead = overlap // 2, following, number + 1, 0
@@ -319,7 +319,7 @@ def _estimates_of_one_net(rows: list[Row], states: Sequence[np.ndarray], at: Seq
     bound = bound._replace(lengths=np.array([*frames, *frames]))
     answer = rows[0].net(np.concatenate([x, x]), np.array([*at, *at]), bound)
     conditional, unconditional = np.split(answer, 2)
-    scale = np.array([row.guidance for row in rows], x.dtype)[:, None, None]
+    scale = np.array([row.guidance(level) for row, level in zip(rows, at)], x.dtype)[:, None, None]
     guided = lerp(unconditional, conditional, scale)
     return [clean[:count] for clean, count in zip(guided, frames, strict=True)]
 

@@ -142,7 +142,7 @@ def sample(
         cond = prior.condition([rows.prompts[i] for i in numbers], padded)
         batch = Batch(numbers, cond, [rows.seeds[i] for i in numbers])
         noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
-        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.guidance)
+        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.strength(prior.schedule))
         denoise, constrain = _identity_when_clean(base), None
         if observed is None:
             state = noise(np.empty((len(numbers), max(lengths), len(prior.mean)), np.float32))
