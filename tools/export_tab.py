@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.requests.sampling import GUIDANCE, SOLVER, SPACING, STEPS
+from motionloom.requests.sampling import GUIDANCE, LATE_GUIDANCE, SOLVER, SPACING, STEPS
 from motionloom.runtime.graph import fields, outline
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.quantise import dequantise, quantise
 from motionloom.weights.container import weights_digest
 from motionloom.weights.prior import Prior, find_weights, load_prior
 
-FORMAT = 1
+FORMAT = 2
 LARGE = 40_000
 """Numbers of a matrix from which on it is stored in eight bits."""
 WORKER = Path(__file__).parents[1] / "studio" / "src" / "tab" / "sw.js"
@@ -84,7 +84,13 @@ def export(prior: Prior, digest: str, folder: Path, *, precise: bool = False) ->
         "fps": prior.fps,
         "net": {name: getattr(config, name) for name in ("features", "width", "layers", "heads", "patch")},
         "schedule": {"name": prior.schedule.name, "steps": prior.schedule.steps},
-        "sampling": {"steps": STEPS, "solver": SOLVER, "spacing": SPACING, "guidance": GUIDANCE},
+        "sampling": {
+            "steps": STEPS,
+            "solver": SOLVER,
+            "spacing": SPACING,
+            "guidance": GUIDANCE,
+            "late_guidance": LATE_GUIDANCE,
+        },
         "vocabulary": {"at": packed.add(vocabulary), "bytes": len(vocabulary)},
         "tensors": tensors,
         "graphs": graphs,

@@ -29,6 +29,11 @@ const LOW = [0.11, 0.05, 0.11, 0.05] as const;
 const [SLOW, STILL_SLOW, TOLD_SLOW] = [0.35, 0.5, 0.6] as const;
 const DRIFT = 0.12;
 const SUNK = 0.002;
+/** Metres: somebody whose toes rest this near to the floor rests on it, and who is three times as far does not. */
+const NEAR = 0.01;
+/** Metres from there below which planted toes are brought there wholly, and at all, if they move up or down slower. */
+const [RESTING, LIFTED, SLOWLY] = [0.02, 0.03, 0.2] as const;
+const LIFT_EASE = 0.05;
 /** Left ankle, left foot, right ankle, right foot: the order of the flags. */
 export const FEET = [LEFT.ankle, LEFT.foot, RIGHT.ankle, RIGHT.foot] as const;
 const NONE: Vec = [0, 0, 0];
@@ -42,6 +47,8 @@ export function cleanFeet(body: Body, contacts: Contacts): Body {
   if (body.root.length < 4) return body;
   const places = placesOf(body);
   const planted = plantedFeet(places, fps, contacts);
+  const level = toeLevel(places, fps);
+  const height = level - clip(level, -NEAR, NEAR) * clip((3 * NEAR - Math.abs(level)) / (2 * NEAR), 0, 1);
   const feet = [0, 1].map((side) => {
     const [ankle, toe] = [FEET[2 * side]!, FEET[2 * side + 1]!];
     const flags = planted.map((row) => [row[2 * side]!, row[2 * side + 1]!] as const);
@@ -52,20 +59,25 @@ export function cleanFeet(body: Body, contacts: Contacts): Body {
       fps,
     );
     const tips = directions.map((way, f) => scaled(way, norm(foot[f]!)));
-    const start = places.map((at) => at[ankle]!);
+    const start = places.map((at) => minus(at[ankle]!, [0, height, 0]));
     const moved = correction(
       start,
       start.map((at, f) => add(at, tips[f]!)),
       flags,
       fps,
     );
-    const targets = start.map((at, f) => add(at, moved[f]!));
+    let targets = places.map((at, f) => add(at[ankle]!, moved[f]!));
+    const stretched = envelope(
+      targets.map((at, f) => overreach(LIMBS[side]!, places[f]!, at)),
+      rounded(LIFT_EASE * fps),
+    );
+    targets = targets.map((at, f) => add(at, [0, Math.min(stretched[f]!, -Math.min(moved[f]![1], 0)), 0]));
     const below = targets.map((at, f) => Math.max(-at[1] - Math.min(tips[f]![1], 0) - SUNK, 0));
-    const lift = envelope(below, rounded(0.1 * fps));
+    const lift = envelope(below, rounded(LIFT_EASE * fps));
     return { targets: targets.map((at, f) => add(at, [0, lift[f]!, 0])), directions };
   });
   const need = places.map((at, f) =>
-    Math.max(...LIMBS.slice(0, 2).map((limb, i) => drop(limb, at, feet[i]!.targets[f]!))),
+    clip(Math.max(...LIMBS.slice(0, 2).map((limb, i) => overreach(limb, at, feet[i]!.targets[f]!))), 0, 0.05),
   );
   const down = envelope(need, rounded(0.15 * fps));
   const lowered = places.map((at, f) => at.map((place) => add(place, [0, -down[f]!, 0])));
@@ -74,16 +86,9 @@ export function cleanFeet(body: Body, contacts: Contacts): Body {
 
 /** Four flags a frame: low, slow, said to be planted, and long enough to be a step. */
 export function plantedFeet(places: readonly Vec[][], fps: number, contacts: Contacts): boolean[][] {
-  const last = places.length - 1;
-  const speed = places.map((_, f) =>
-    FEET.map((joint) => {
-      const [a, b] = [Math.max(f - 1, 0), Math.min(f + 1, last)];
-      return (norm(minus(places[b]![joint]!, places[a]![joint]!)) / (b - a)) * fps;
-    }),
-  );
+  const speed = speedOfFeet(places, fps);
   const height = places.map((at) => FEET.map((joint) => at[joint]![1]));
-  const resting = height.flatMap((row, f) => [1, 3].filter((k) => speed[f]![k]! < SLOW).map((k) => row[k]!));
-  const level = resting.length ? percentile(resting, 30) : Math.min(...height.flat());
+  const level = toeLevel(places, fps);
   const may = places.map((_, f) =>
     FEET.map((__, k) => {
       if (height[f]![k]! >= level + LOW[k]!) return false;
@@ -98,6 +103,24 @@ export function plantedFeet(places: readonly Vec[][], fps: number, contacts: Con
       for (let f = start; f < stop; f += 1) result[f]![k] = stop - start >= least;
   }
   return result;
+}
+
+/** Height at which toes rest; that of the lowest where none do. */
+function toeLevel(places: readonly Vec[][], fps: number): number {
+  const speed = speedOfFeet(places, fps);
+  const resting = places.flatMap((at, f) => [1, 3].filter((k) => speed[f]![k]! < SLOW).map((k) => at[FEET[k]!]![1]));
+  return resting.length ? percentile(resting, 30) : Math.min(...places.flatMap((at) => FEET.map((k) => at[k]![1])));
+}
+
+/** Metres per second of the four joints in each frame. */
+function speedOfFeet(places: readonly Vec[][], fps: number): number[][] {
+  const last = places.length - 1;
+  return places.map((_, f) =>
+    FEET.map((joint) => {
+      const [a, b] = [Math.max(f - 1, 0), Math.min(f + 1, last)];
+      return (norm(minus(places[b]![joint]!, places[a]![joint]!)) / (b - a)) * fps;
+    }),
+  );
 }
 
 /** Half-open ranges of consecutive true flags. */
@@ -138,7 +161,7 @@ function steadyDirections(foot: readonly Vec[], flat: readonly boolean[], fps: n
   return result.map(unit);
 }
 
-/** Metres to add to a foot so that whatever is planted does not move; eased in and out. */
+/** Metres to add to a foot so that whatever is planted does not move and resting toes rest on height 0; eased. */
 function correction(
   ankle: readonly Vec[],
   toe: readonly Vec[],
@@ -157,6 +180,10 @@ function correction(
     planted.map(([heel, tip]) => heel || tip),
     Math.max(2, rounded((EASE * fps) / 2)),
   );
+  for (const [start, path] of found) {
+    const down = toFloor(toe.slice(start, start + path.length), planted.slice(start, start + path.length), fps);
+    path.forEach((value, n) => (path[n] = [value[0], down[n]!, value[2]]));
+  }
   const result: Vec[] = ankle.map(() => NONE);
   for (const [start, path] of found) path.forEach((value, n) => (result[start + n] = value));
   bridge(
@@ -165,6 +192,26 @@ function correction(
     Math.max(2, rounded(EASE * fps)),
   );
   return result;
+}
+
+/** Metres to add to the heights of a stance's toes; toes that begin to rise may. */
+function toFloor(toe: readonly Vec[], planted: readonly (readonly [boolean, boolean])[], fps: number): number[] {
+  const height = toe.map((at) => at[1]);
+  const last = height.length - 1;
+  const resting = [...height.keys()].filter((f) => {
+    const [a, b] = [Math.max(f - 1, 0), Math.min(f + 1, last)];
+    const speed = (Math.abs(height[b]! - height[a]!) / (b - a)) * fps;
+    return planted[f]![1] && speed < SLOWLY;
+  });
+  const down = height.map((at) => -at * clip((LIFTED - Math.abs(at)) / (LIFTED - RESTING), 0, 1));
+  return height.map((_, f) => {
+    const after = resting.findIndex((one) => one >= f);
+    if (resting.length === 0) return 0;
+    if (after === 0) return down[resting[0]!]!;
+    if (after < 0) return down[resting.at(-1)!]!;
+    const [a, b] = [resting[after - 1]!, resting[after]!];
+    return down[a]! + ((f - a) / (b - a)) * (down[b]! - down[a]!);
+  });
 }
 
 /** First frame and correction of each stance, of mean 0; stances that stray are split where they are fastest. */
@@ -249,13 +296,13 @@ function envelope(need: readonly number[], size: number): number[] {
   return curve;
 }
 
-/** Metres by which the root goes down so that a leg is not stretched beyond what it was or 99.5 %. */
-function drop(limb: Limb, places: readonly Vec[], target: Vec): number {
+/** Metres that an ankle's target is too low for a leg stretched as far as it was, or to 99.5 %. */
+function overreach(limb: Limb, places: readonly Vec[], target: Vec): number {
   const full = LENGTHS[limb.middle]! + LENGTHS[limb.end]!;
   const most = Math.max(norm(minus(places[limb.end]!, places[limb.start]!)), 0.995 * full);
   const line = minus(target, places[limb.start]!);
   const height = Math.sqrt(Math.max(most ** 2 - line[0] ** 2 - line[2] ** 2, 0));
-  return norm(line) > most ? clip(-line[1] - height, 0, 0.05) : 0;
+  return norm(line) > most ? Math.max(-line[1] - height, 0) : 0;
 }
 
 interface Foot {

@@ -10,7 +10,7 @@ import { Noise } from "./noise";
 import type { Condition, Network } from "./network";
 import type { Body } from "./person";
 import { type Place, type Way, seenFrom, startOf, wayThrough } from "./path";
-import { cosine, levels, move } from "./schedule";
+import { cosine, guidanceAt, levels, move } from "./schedule";
 import { supported } from "./stairs";
 import { Steering } from "./steering";
 import { type Vec, rounded } from "./turns";
@@ -181,7 +181,8 @@ export class Prior {
 
   private estimated(rows: readonly Link[], states: readonly Float32Array[], level: number): Promise<Float32Array[]> {
     const asked = rows.map((row, r) => ({ state: states[r]!, level, asked: row.asked }));
-    return this.network.guided(asked, this.network.packed.about.sampling.guidance);
+    const { schedule, sampling } = this.network.packed.about;
+    return this.network.guided(asked, guidanceAt(level, schedule.steps, sampling.guidance, sampling.late_guidance));
   }
 
   /** Averages over all ways to divide the frames into the network's tokens, so that none leaves small steps. */

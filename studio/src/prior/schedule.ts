@@ -29,6 +29,12 @@ export function levels(top: number, steps: number): number[] {
   return [...result, 0];
 }
 
+/** Guidance at a level: what it adds to 1 is `late` times as much below a quarter of all levels, as much above half. */
+export function guidanceAt(level: number, steps: number, scale: number, late: number): number {
+  const share = Math.min(Math.max(2 - (4 * level) / steps, 0), 1);
+  return scale + Math.max(scale - 1, 0) * (late - 1) * share;
+}
+
 /** Factors of the estimate, the state and fresh noise in the move from level t to s (Ho et al. 2020, eq. 7). */
 export function move({ signal, noise }: Schedule, t: number, s: number): readonly [number, number, number] {
   const r = (signal[t]! * noise[s]!) / (signal[s]! * noise[t]!);

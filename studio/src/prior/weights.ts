@@ -24,7 +24,7 @@ export interface Manifest {
     readonly patch: number;
   };
   readonly schedule: { readonly steps: number };
-  readonly sampling: { readonly steps: number; readonly guidance: number };
+  readonly sampling: { readonly steps: number; readonly guidance: number; readonly late_guidance: number };
   readonly vocabulary: { readonly at: number; readonly bytes: number };
   readonly tensors: Readonly<Record<string, Entry>>;
   readonly graphs: Readonly<Record<string, { at: number; bytes: number; weights: readonly string[] }>>;
@@ -32,7 +32,7 @@ export interface Manifest {
   readonly sha256: string;
 }
 
-const FORMAT = 1;
+const FORMAT = 2;
 
 export class Packed {
   constructor(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.diffusion import SOLVERS, blend, cosine, from_noise, guide, inpaint, levels, row_noise, run
+from motionloom.diffusion import SOLVERS, blend, cosine, from_noise, guide, inpaint, levels, rising, row_noise, run
 from tests.diffusion.exact import TILTED, shared_draw, wavy
 
 SCHEDULE = cosine(40)
@@ -55,6 +55,22 @@ def test_guidance_is_one_call_on_a_doubled_batch_and_one_plain_call_at_0_and_1()
         assert calls == expected, scale
     assert np.array_equal(guide(net, COND, NULL, 1.0)(x, 3), net(x, 3, COND))
     assert np.array_equal(guide(net, COND, NULL, 0.0)(x, 3), net(x, 3, NULL))
+
+
+def test_a_scale_may_depend_on_the_level():
+    x = some()
+    guided = guide(net, COND, NULL, lambda level: [0.0, 1.0, 2.5, 4.0][level])
+    for level, scale in enumerate([0.0, 1.0, 2.5, 4.0]):
+        assert np.array_equal(guided(x, level), guide(net, COND, NULL, scale)(x, level))
+
+
+@pytest.mark.parametrize(
+    ("scale", "expected"),
+    [(2.5, [4.75, 4.75, 3.625, 2.5, 2.5]), (1.0, [1.0] * 5), (0.0, [0.0] * 5), (-2.0, [-2.0] * 5)],
+)
+def test_guidance_rises_below_half_of_the_levels(scale, expected):
+    at = rising(scale, 1000, 2.5)
+    np.testing.assert_allclose([at(level) for level in (0, 250, 375, 500, 999)], expected)
 
 
 def test_a_row_gets_its_own_answer_whatever_the_scales_of_the_others():

@@ -37,8 +37,9 @@ _SUNK = 0.002
 """Metres under the floor that are left, as in recordings: lifting every millimetre would leave people afloat."""
 _NEAR = 0.01
 """Metres: somebody whose toes rest this near to the floor rests on it, and who is three times as far does not."""
-_RESTING = (0.03, 0.2)
-"""Metres from there, and metres per second up or down, below which planted toes are brought there."""
+_RESTING, _SLOWLY = (0.02, 0.03), 0.2
+"""Metres from there below which planted toes are brought there wholly, and at all, if they rise or sink slower than so
+many metres per second."""
 _LIFT_EASE = 0.05
 """Seconds over which a foot is lifted out of the floor; longer would lift a stance for the toes that leave it."""
 _LENGTHS = SMPL22.bone_lengths()
@@ -191,9 +192,10 @@ def correction(
 
 def _to_floor(height: Array, planted: Flags, fps: float) -> Array:
     """(frames,) metres to add in a stance whose toes are ``height`` above the floor; toes that begin to rise may."""
-    resting = planted & (np.abs(height) < _RESTING[0]) & (np.abs(np.gradient(height)) * fps < _RESTING[1])
-    frames = np.flatnonzero(resting)
-    return np.interp(np.arange(len(height)), frames, -height[frames]) if len(frames) else np.zeros(len(height))
+    frames = np.flatnonzero(planted & (np.abs(np.gradient(height)) * fps < _SLOWLY))
+    near, far = _RESTING
+    down = -height * ((far - np.abs(height)) / (far - near)).clip(0, 1)
+    return np.interp(np.arange(len(height)), frames, down[frames]) if len(frames) else np.zeros(len(height))
 
 
 def _pieces(steps: Array, standing: Flags, hole: int) -> Iterator[tuple[int, Array]]:
