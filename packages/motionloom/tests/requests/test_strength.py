@@ -3,7 +3,7 @@
 import pytest
 
 from motionloom.diffusion import cosine
-from motionloom.requests.sampling import GUIDANCE, LATE_GUIDANCE, PredictionSampling, Sampling
+from motionloom.requests.sampling import GUIDANCE, LATE_GUIDANCE, PairSampling, PredictionSampling, Sampling
 
 SCHEDULE = cosine(1000)
 
@@ -16,8 +16,8 @@ def test_with_early_spacing_guidance_rises_towards_the_end() -> None:
 
 
 @pytest.mark.parametrize(
-    "sampling", [Sampling(spacing="index"), PredictionSampling(guidance=2.5), Sampling(guidance=1.0)]
+    "sampling", [Sampling(spacing="index"), PredictionSampling(guidance=2.5), PairSampling(), Sampling(guidance=1.0)]
 )
-def test_published_spacing_and_no_guidance_stay_the_same_on_all_levels(sampling: Sampling) -> None:
+def test_published_spacing_pairs_and_no_guidance_stay_the_same_on_all_levels(sampling: Sampling) -> None:
     strength = sampling.strength(SCHEDULE)
     assert {strength(level) for level in (1, 100, 500, 999)} == {sampling.guidance}

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypedDict
 
 from motionloom.errors import MotionloomError
 from motionloom.requests.fields import Checked, declare, like
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
 LATE_GUIDANCE = 2.5
-"""How motions are sampled unless asked otherwise (docs/decisions/0008); the last is the factor of `strength`."""
+"""How motions are sampled unless the request differs (docs/decisions/0008); the last is the factor of `rising`."""
 BATCH = 8
 """Rows in one network call."""
 SOLVERS = ("ddpm", "ddim", "dpm2m", "dpm2m-sde")
@@ -87,6 +87,8 @@ class Sampling(Checked):
         high=16,
     )
 
+    late_guidance: ClassVar[float] = LATE_GUIDANCE
+
     @classmethod
     def of(cls, sampling: Self | None, settings: Mapping[str, Any]) -> Self:
         """``sampling``, or the defaults, with single settings changed.
@@ -121,7 +123,7 @@ class Sampling(Checked):
         from motionloom.diffusion import rising
 
         scale = self.guidance if guidance is None else guidance
-        return rising(scale, schedule.steps, LATE_GUIDANCE if self.spacing == "early" else 1)
+        return rising(scale, schedule.steps, self.late_guidance if self.spacing == "early" else 1)
 
     def seeds(self, count: int) -> list[int]:
         """The seeds of ``count`` motions of one person."""
@@ -171,7 +173,9 @@ class PredictionSampling(Sampling):
 
 @dataclass(frozen=True)
 class PairSampling(Sampling):
-    """How two people are sampled."""
+    """How two people are sampled: with the same guidance on all levels, else they come into each other more often."""
+
+    late_guidance: ClassVar[float] = 1.0
 
     pair_guidance: float = declare(
         "number",
