@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypedDict
 
 from motionloom.errors import MotionloomError
 from motionloom.requests.fields import Checked, declare, like
@@ -87,7 +87,7 @@ class Sampling(Checked):
         high=16,
     )
 
-    late_guidance: ClassVar[float] = LATE_GUIDANCE
+    late_guidance = LATE_GUIDANCE
 
     @classmethod
     def of(cls, sampling: Self | None, settings: Mapping[str, Any]) -> Self:
@@ -175,7 +175,7 @@ class PredictionSampling(Sampling):
 class PairSampling(Sampling):
     """How two people are sampled: with the same guidance on all levels, else they come into each other more often."""
 
-    late_guidance: ClassVar[float] = 1.0
+    late_guidance = 1.0
 
     pair_guidance: float = declare(
         "number",
