@@ -5,7 +5,7 @@ Usage: python benchmarks/read_words.py > benchmarks/read_words.txt
 
 import sys
 
-from motionloom.goals.amount_goal import is_met, measured
+from motionloom.goals.amounts import is_met, measured
 from motionloom.tasks.text import generate
 from motionloom.tasks.worded import generate_timelines, read
 from motionloom.weights.prior import Prior, find_weights

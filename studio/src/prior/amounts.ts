@@ -1,4 +1,4 @@
-/** Numbers in words as what is drawn: lengths, ways of the pelvis, strokes one after the other (`motionloom.goals.amount_goal`). */
+/** Numbers in words as what is drawn: lengths, ways of the pelvis, strokes one after the other (`motionloom.goals.amounts`). */
 
 import type { Place, Way } from "./path";
 import { FASTEST, between } from "./path";

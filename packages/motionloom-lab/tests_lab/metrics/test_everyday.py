@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.english import is_english
+from motionloom.goals.remarks import is_english
 from motionloom.kinematics.physics import J
 from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.everyday.body import Body, times

@@ -1,7 +1,7 @@
 """Networks of weight files as PyTorch modules, which training goes on with, and modules as what a weight file holds."""
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,7 +14,9 @@ from motionloom.runtime.text.minilm import HEAD_WIDTH, WORDS, MiniLM, sizes_of, 
 from motionloom.runtime.text.quantise import dequantise
 from motionloom.weights.adapter import NET
 from motionloom.weights.container import check
-from motionloom.weights.pair import HasNet, PairBlock
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.predictor import Predictor
+from motionloom.weights.prior import Prior
 from motionloom_train.export import pair_graph, predictor_graph, prior_graphs, text_graph
 from motionloom_train.nets.pair import PairNet, Talk
 from motionloom_train.nets.predictor import TransLinear
@@ -23,14 +25,7 @@ from motionloom_train.nets.text.bert import Bert
 from motionloom_train.nets.unfilled import unfilled
 
 
-class HasSession(Protocol):
-    """A prior or a predictor, as far as it is looked at here."""
-
-    @property
-    def net(self) -> Any: ...
-
-
-def prior_module(prior: HasSession) -> PriorNet:
+def prior_module(prior: Prior) -> PriorNet:
     """A prior's network as a module in evaluation mode, without gradients; float32."""
     return _module(PriorNet, prior.net, "the prior")
 
@@ -41,7 +36,7 @@ def prior_session(net: PriorNet) -> PriorSession:
     return PriorSession(net.config, weights, prior_graphs(net.config))
 
 
-def pair_module(block: PairBlock, prior: HasNet) -> PairNet:
+def pair_module(block: PairBlock, prior: Prior) -> PairNet:
     """The network of two people as a module in evaluation mode, without gradients."""
     talk = Talk(block.config, prior.net.config)
     fill(talk, block.tensors, "the block")
@@ -59,7 +54,7 @@ def pair_session(net: PairNet) -> PairSession:
     return PairSession(config, arrays(net.talk), graph, prior, net.schedule, *numbers)
 
 
-def predictor_module(predictor: HasSession) -> TransLinear:
+def predictor_module(predictor: Predictor) -> TransLinear:
     """A predictor's network as a module in evaluation mode, without gradients."""
     return _module(TransLinear, predictor.net, "the predictor")
 

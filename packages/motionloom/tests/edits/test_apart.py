@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motionloom.edits.apart import kept_apart, shift_apart
-from motionloom.edits.bodies import Bodies
+from motionloom.edits.meeting import Bodies
 from motionloom.features import pair as two
 from motionloom.features.pair import PairMotion
 from motionloom.io import load

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motionloom.edits.reach import lowered, out_of_reach, room_above
+from motionloom.edits.steering import lowered, out_of_reach, room_above
 from motionloom.goals.goal import Goal
 from motionloom.skeleton import SMPL22
 

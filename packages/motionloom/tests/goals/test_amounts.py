@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.amount_goal import goal_for, is_met, measured, seconds_for
-from motionloom.goals.amounts import read_amount, read_seconds
+from motionloom.goals.amounts import goal_for, is_met, measured, read_amount, read_seconds, seconds_for
 from motionloom.goals.sequence import natural_seconds
 from motionloom.goals.timeline import timeline_of
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from motionloom.goals.english import is_english
+from motionloom.goals.remarks import is_english
 
 OTHERS = [
     "eine Person geht vorwärts",

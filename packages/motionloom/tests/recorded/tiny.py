@@ -6,8 +6,7 @@ from motionloom.diffusion import cosine
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.shapes import prior_shapes
 from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.minilm import WORDS, MiniLM, pack, shapes
-from motionloom.runtime.text.wordpiece import SPECIALS
+from motionloom.runtime.text.minilm import SPECIALS, WORDS, MiniLM, pack, shapes
 from motionloom.weights.adapter import GIVEN, NET, TAUGHT, Adapter, fingerprint, layers
 from motionloom.weights.prior import Card, Prior
 from tests.recorded.graphs import MODULATED, PUBLISHED, TEXT, graph, random_weights

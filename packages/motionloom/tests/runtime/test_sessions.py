@@ -10,7 +10,7 @@ from motionloom.errors import MotionloomError
 from motionloom.runtime.prior import PriorSession, patches, valid_frames
 from motionloom.runtime.prior_condition import Bound
 from motionloom.runtime.session import find_device, set_threads, threads
-from motionloom.weights.adapter import Adapter, adapted, show
+from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Prior
@@ -135,16 +135,16 @@ def test_what_is_shown_is_what_the_first_layer_would_add(prior: Prior) -> None:
     net = adapted(prior.net, adapter)
     bound = net.bind(prior.condition(["a person walks"]))
     given, mask = noise(1, 10, 263), noise(1, 10, 263) > 0.5
-    shown = show(net, bound, given, mask).shown
+    shown = net.show(bound, given, mask).shown
     frames = np.zeros((12, 2 * 263), np.float32)
     frames[:10] = np.concatenate([np.where(mask, given, 0), mask], axis=-1)[0]
     token = frames[4:8].reshape(-1)
     expected = adapter.tensors["given.up"] @ (adapter.tensors["given.down"] @ token)
     np.testing.assert_allclose(shown[0, 1], expected, atol=1e-4)
     assert shown.shape == (1, 3, 320)
-    assert show(prior.net, bound, given, mask) is bound  # a plain network is shown nothing
+    assert prior.net.show(bound, given, mask) is bound  # a plain network is shown nothing
     x = noise(1, 10, 263)
-    assert np.abs(net(x, 500, show(net, bound, given, mask)) - net(x, 500, bound)).max() > 0.01
+    assert np.abs(net(x, 500, net.show(bound, given, mask)) - net(x, 500, bound)).max() > 0.01
 
 
 def test_patches_are_frames_side_by_side() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from motionloom.diffusion import generator, guide
 from motionloom.diffusion.sampling import row_seed
-from motionloom.goals.amount_goal import measured
+from motionloom.goals.amounts import measured
 from motionloom.goals.goal import start_of
 from motionloom.goals.paths import root_path
 from motionloom.goals.segment import Segment

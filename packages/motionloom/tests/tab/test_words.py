@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.goals.amount_goal import seconds_for
-from motionloom.goals.amounts import read_amount, read_seconds
+from motionloom.goals.amounts import read_amount, read_seconds, seconds_for
 from motionloom.goals.segment import Segment
 from motionloom.goals.sequence import split_actions
 from motionloom.goals.timeline import LONGEST, with_amount

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
-from motionloom.tasks.adapting import CACHE_SIZE, AdaptedPriors, adapt
+from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors
 from motionloom.tasks.long import load_segment_adapters, long_features
 from motionloom.tasks.text import sample_features
 from motionloom.weights.adapter import Adapter, fingerprint, origin
@@ -138,14 +138,14 @@ def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> 
 
 
 def test_merged_networks_are_kept_but_not_without_end(prior: Prior) -> None:
-    priors = AdaptedPriors(prior)
+    adapted = adapted_priors(prior)
     one = adapter(prior)
-    first = priors.of(((one, 1.0),))
-    assert priors.of(((one, 1.0),)) is first
-    assert priors.of(()) is prior
+    first = adapted(((one, 1.0),))
+    assert adapted(((one, 1.0),)) is first
+    assert adapted(()) is prior
     for number in range(CACHE_SIZE):
-        priors.of(((one, number / 10),))
-    assert len(priors.cache) == CACHE_SIZE
+        adapted(((one, number / 10),))
+    assert adapted(((one, 1.0),)) is not first
 
 
 def test_the_same_seed_and_adapters_draw_the_same(prior: Prior) -> None:

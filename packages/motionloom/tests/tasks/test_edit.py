@@ -17,8 +17,7 @@ from motionloom.retarget.onto import match_root
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.edit import Extend, Loop, Redraw, changes_from_options, edit, kept_feature_mask
-from motionloom.tasks.inpaint import inpaint_motion
+from motionloom.tasks.edit import Extend, Loop, Redraw, changes_from_options, edit, inpaint_motion, kept_feature_mask
 from motionloom.tasks.splice import ground_pose_at, kept_parts, move_rigidly, person_at_20, splice
 from motionloom.weights.prior import Prior
 from tests.noise import normal

@@ -11,10 +11,9 @@ from motionloom.motion import Motion
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import predict as task
-from motionloom.tasks.held_parts import prepare_hold
-from motionloom.tasks.predict import predict, predict_pieces
+from motionloom.tasks.completion import Past
+from motionloom.tasks.predict import predict, predict_pieces, prepare_hold
 from motionloom.tasks.splice import concatenate, ground_pose_at, move_rigidly, overlay
-from motionloom.tasks.windows import Past
 from tests.tasks.small_predictor import small_predictor
 from tests.tasks.test_edit import floating, person, rig
 
@@ -86,7 +85,7 @@ def test_a_part_that_is_held_for_a_while_is_led_there_and_back() -> None:
     assert inside.sum() == 7
     same = (made.rotations[:, joints] == SOURCE.rotations[:24, joints]).all((1, 2))
     assert np.array_equal(same, inside)
-    ready = prepare_hold(PREDICTOR, Past.of(PREDICTOR, PAST), held("left_arm", spans=spans), 0.8)
+    ready = prepare_hold(Past.of(PREDICTOR, PAST), held("left_arm", spans=spans), 0.8)
     assert ready is not None
     share = ready.joints[:24, 16]
     assert np.array_equal(share == 1, inside)
@@ -108,7 +107,7 @@ def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:
     made = future(held("left_arm", source=SOURCE.frames(0, 12)))
     joints = sorted(SMPL22.resolve(["left_arm"]))
     assert np.array_equal(made.rotations[:12, joints], SOURCE.rotations[:12, joints])
-    ready = prepare_hold(PREDICTOR, Past.of(PREDICTOR, PAST), held("left_arm", source=SOURCE.frames(0, 12)), 0.8)
+    ready = prepare_hold(Past.of(PREDICTOR, PAST), held("left_arm", source=SOURCE.frames(0, 12)), 0.8)
     assert ready is not None
     share = np.append(ready.joints[:, 16], 0)
     assert (share[:12] == 1).all()
@@ -128,7 +127,6 @@ def test_what_is_held_is_shown_to_the_network_and_changes_the_free_joints() -> N
 def test_the_network_sees_the_source_at_its_own_moments_from_the_first_predicted_frame_on() -> None:
     after = person(3.0, 60.0).frames(60, 150)
     ready = prepare_hold(
-        PREDICTOR,
         Past.of(PREDICTOR, person(1.0, 60.0)),
         held("left_arm", "root", source=after, spans=((0.0, 0.5),)),
         1.0,

@@ -13,9 +13,9 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
+from motionloom.tasks.completion import Past, WindowSampler
 from motionloom.tasks.predict import predict, predict_pieces, switch
 from motionloom.tasks.splice import concatenate, ground_pose_at
-from motionloom.tasks.windows import Past, WindowSampler
 from tests.recorded import tiny_predictor
 from tests.shared import shared
 from tests.tasks.small_predictor import small_predictor

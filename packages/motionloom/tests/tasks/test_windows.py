@@ -10,9 +10,8 @@ from motionloom.features.positions import bone_lengths
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
-from motionloom.tasks import windows
-from motionloom.tasks.completion import next_frames
-from motionloom.tasks.windows import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, window_count
+from motionloom.tasks import completion
+from motionloom.tasks.completion import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, next_frames, window_count
 from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
 
@@ -100,7 +99,7 @@ def sinking(depth: float):
 
 
 def test_nobody_sinks_under_the_floor_and_the_lift_is_smooth(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(windows, "next_frames", sinking(0.5))
+    monkeypatch.setattr(completion, "next_frames", sinking(0.5))
     made = next(SAMPLER.windows(SEEN, [(0, 0)], None, 1))[0]
     assert made[..., 1].min() > SEEN[0, -1, :, 1].min().clip(max=0) - 0.05
     whole = np.concatenate([SEEN[0, -3:, :, 1], made[..., 1]])
@@ -110,9 +109,9 @@ def test_nobody_sinks_under_the_floor_and_the_lift_is_smooth(monkeypatch: pytest
 
 
 def test_people_above_the_floor_or_already_under_it_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(windows, "next_frames", sinking(-0.5))
+    monkeypatch.setattr(completion, "next_frames", sinking(-0.5))
     up = next(SAMPLER.windows(SEEN, [(0, 0)], None, 1))
     assert np.array_equal(up, sinking(-0.5)(PREDICTOR, SEEN))
-    monkeypatch.setattr(windows, "next_frames", sinking(0.0))
+    monkeypatch.setattr(completion, "next_frames", sinking(0.0))
     cellar = SEEN - np.array([0, 1.0, 0])
     assert np.array_equal(next(SAMPLER.windows(cellar, [(0, 0)], None, 1)), sinking(0.0)(PREDICTOR, cellar))

@@ -11,7 +11,7 @@ from motionloom.diffusion import join_rows
 from motionloom.errors import MotionloomError
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound, condition
-from motionloom.weights.adapter import GIVEN, Adapter, adapted, adapters, layers, show
+from motionloom.weights.adapter import GIVEN, Adapter, adapted, adapters, layers
 from motionloom.weights.container import ADAPTERS
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny
@@ -51,7 +51,7 @@ def test_what_is_given_is_added_to_each_token():
     prior = tiny.prior()
     found = control_adapter(prior)
     merged, (x, mask) = adapted(prior.net, found), sample()
-    added = show(merged, bound(merged), x, mask).shown
+    added = merged.show(bound(merged), x, mask).shown
     shown = np.concatenate([np.where(mask, x, 0), mask], axis=-1)
     wanted = shown[:, :8].reshape(2, 2, -1) @ (found.tensors[f"{GIVEN}.up"] @ found.tensors[f"{GIVEN}.down"]).T
     np.testing.assert_allclose(added[:, :2], wanted, rtol=1e-4, atol=1e-5)
@@ -62,7 +62,7 @@ def test_rows_of_shown_conditions_join():
     prior = tiny.prior()
     merged, (x, mask) = adapted(prior.net, control_adapter(prior)), sample()
     plain = bound(merged)
-    first, second = show(merged, plain, x, mask), show(merged, plain, x, ~mask)
+    first, second = merged.show(plain, x, mask), merged.show(plain, x, ~mask)
     both = merged(np.concatenate([x, x]), 5, join_rows(first, second))
     np.testing.assert_array_equal(both, np.concatenate([merged(x, 5, first), merged(x, 5, second)]))
 
@@ -71,7 +71,7 @@ def test_a_plain_condition_means_an_empty_mask():
     prior = tiny.prior()
     merged, (x, mask) = adapted(prior.net, control_adapter(prior)), sample()
     plain = bound(merged)
-    empty, seen = show(merged, plain, x, np.zeros(mask.shape, bool)), show(merged, plain, x, mask)
+    empty, seen = merged.show(plain, x, np.zeros(mask.shape, bool)), merged.show(plain, x, mask)
     np.testing.assert_array_equal(merged(x, 5, plain), merged(x, 5, empty))
     assert np.abs(merged(x, 5, seen) - merged(x, 5, plain)).max() > 1e-3
 

@@ -10,7 +10,7 @@ from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.runtime.text.published import PublishedText
 from motionloom.weights.adapter import fingerprint
-from motionloom.weights.pair import UNKNOWN, HasNet, PairBlock
+from motionloom.weights.pair import UNKNOWN, PairBlock
 from motionloom.weights.prior import Card, Prior
 from motionloom_lab.papers.commdm import adds_of, from_published_pair, is_pair
 from motionloom_lab.papers.mdm import FRAME_RATES, describe, from_published, read_published
@@ -63,7 +63,7 @@ def _plain_options(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def import_block(
-    path: Path | str, prior: HasNet, *, base: str, name: str | None = None, licence: str | None = None
+    path: Path | str, prior: Prior, *, base: str, name: str | None = None, licence: str | None = None
 ) -> PairBlock:
     """The block of a published two-person checkpoint, for ``prior``, which is the network of the same file.
 

@@ -14,10 +14,9 @@ from torch import nn
 from motionloom.diffusion import row_seed
 from motionloom.features import pair as two
 from motionloom.features.pair import PairMotion
-from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.runtime.pair import PairSession
-from motionloom.tasks.long import Past
+from motionloom.tasks.long import holding_correction
 from motionloom.tasks.pair import PairEdits, pair_features, person_seeds
 from motionloom.tasks.people import known_state
 from motionloom.weights.pair import PairBlock
@@ -117,7 +116,7 @@ def sampled(
         worlds = [visible_part(crop, given) for crop in crops.positions]
         known = PairMotion.stack([two.encode(world) for world in worlds])
         people = [person for one in known.features for person in one]
-        leaving = [Past(person, GroundPose()).start_correction(prior, FRAMES) for person in people]
+        leaving = [holding_correction(person, prior, FRAMES) for person in people]
         sampled = make(
             prior,
             net,

@@ -19,9 +19,8 @@ from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.completion import Known, next_frames
+from motionloom.tasks.completion import Known, WindowSampler, next_frames
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.windows import WindowSampler
 from motionloom.weights.predictor import Predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.metrics.prediction_body import seam

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.runtime.text.wordpiece import SPECIALS
+from motionloom.runtime.text.minilm import SPECIALS
 from tests.recorded.tiny import VOCABULARY
 from tools import compress_text_encoder as compress
 

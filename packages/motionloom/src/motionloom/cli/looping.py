@@ -5,7 +5,7 @@ import sys
 
 from motionloom.cli.sampling import fail, sampling_of
 from motionloom.motion import Motion
-from motionloom.tasks.edit import Loop, close
+from motionloom.tasks.edit import Loop, edit
 from motionloom.weights.prior import Prior
 
 
@@ -47,5 +47,6 @@ def looped(arguments: argparse.Namespace, prior: Prior, motion: Motion, text: st
 
     names = ("steps", "guidance") if text else ("steps",)
     settings = {name: value for name, value in sampling_of(arguments).items() if name in names}
-    settings |= {"blend": arguments.blend, "foot_lock": getattr(arguments, "foot_lock", True)}
-    return close(prior, motion, text, seed=seed, **settings)
+    settings |= {"foot_lock": getattr(arguments, "foot_lock", True), "seed": seed}
+    [closed] = edit(prior, motion, text, Loop(arguments.blend), **settings)
+    return closed

@@ -12,16 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
-from motionloom.edits.apart import even, shift_apart
+from motionloom.edits.apart import even, kept_apart, shift_apart
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import lacking
-from motionloom.features.pair import PairMotion
+from motionloom.edits.steering import toward
+from motionloom.features.pair import PairMotion, PlaceCode
 from motionloom.goals.contact import CHEST, RIGHT, Contact, Touch
 from motionloom.goals.goal import Goal, overlaid
 from motionloom.ground import GroundPose, relative, turned
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, closest
 from motionloom.motion import Motion, heading
+from motionloom.runtime.pair import join, part
 from motionloom.skeleton import SMPL22
+from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 
@@ -39,13 +42,8 @@ ASIDE = 0.12
 """Metres on the ground, from the middle between two people, within which their hands meet."""
 
 
-def _heights() -> Array:
-    """(22,) metres above the floor of the joints of somebody who stands."""
-    places = SMPL22.rest_positions()
-    return places[:, 1] - places[:, 1].min()
-
-
-_STANDING = _heights()
+_STANDING = SMPL22.rest_positions()[:, 1] - SMPL22.rest_positions()[:, 1].min()
+"""(22,) metres above the floor of the joints of somebody who stands."""
 
 
 @dataclass(eq=False)
@@ -117,8 +115,11 @@ class Meeting:
                 _ask(goals[touch.person], at, touch.joint, self._beside(touch, places[1 - touch.person, at], stands))
                 continue
             ends = places[0, at, touch.joint], places[1, at, touch.other]
-            if not all(self.free) and not self._offered(ends[0] if self.free[1] else ends[1]):
-                continue
+            if not all(self.free):  # a hand of somebody given is reached for only where such hands meet
+                low, high = self.contact.height
+                hand = ends[0] if self.free[1] else ends[1]
+                if not low - OFFERED < float(hand[:, 1].mean()) < high + OFFERED:
+                    continue
             point, across = self._point(places[:, at], ends)
             _ask(goals[0], at, touch.joint, point - GAP / 2 * across)
             _ask(goals[1], at, touch.other, point + GAP / 2 * across)
@@ -161,11 +162,6 @@ class Meeting:
         if stands is None:
             return other[:, touch.other] + turned(beside, heading(other))
         return stands[1 - touch.person].to_world(beside + np.array([0.0, _STANDING[touch.other], 0.0]))
-
-    def _offered(self, hand: Array) -> bool:
-        """Whether the hand (frames, 3) of somebody given is where such hands meet; else nobody reaches for it."""
-        low, high = self.contact.height
-        return low - OFFERED < float(hand[:, 1].mean()) < high + OFFERED
 
     def _point(self, places: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         """(frames, 3) where two hands meet, and the unit vectors from one to the other."""
@@ -268,3 +264,72 @@ _BENDING = [joint for number in ARMS for joint, _ in CAPSULES[number][1]]
 def _at(ends: Array, share: Array) -> Array:
     """(frames, 3) on line segments (frames, 2, 3)."""
     return ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
+
+
+# Two bodies: how the denoised estimates of a pair are changed
+
+
+SURE = 0.8
+"""The noise of a level above which nothing is moved: where the two are is not decided."""
+
+
+@dataclass(eq=False)
+class Bodies:
+    """How the estimates of one pair are changed: their hands meet where something says so, and they are kept apart."""
+
+    free: tuple[bool, bool]
+    """Who may be moved as a whole."""
+    bends: tuple[bool, bool]
+    """Whose limbs may be moved."""
+    still: int = 0
+    """Frames in which both stay where they are."""
+    meeting: Meeting | None = None
+
+    @staticmethod
+    def of(mask: np.ndarray, frozen: Sequence[bool], meeting: Meeting | None = None, *, still: int = 0) -> "Bodies":
+        """mask: (2, 1 + frames, 263) True where the state is known; frozen: who is not moved as a whole; still: frames
+        that stay in any case."""
+        known = np.asarray(mask[:, 1:, :3].all(axis=-1))
+        still = int(known.all(axis=0).cumprod().sum()) or int(mask[:, 0].any()) or still
+        bends = not bool(known[0].all()), not bool(known[1].all())
+        free = bends[0] and not frozen[0], bends[1] and not frozen[1]
+        if meeting:
+            meeting.free, meeting.still = bends, still
+        return Bodies(free, bends, still, meeting if any(bends) else None)
+
+    def edit(
+        self, prior: Prior, code: PlaceCode, state: np.ndarray, level: int, begin: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """A denoised state (2, 1 + frames, 263), and the ground poses (2, 4) at its first frame, changed.
+
+        begin: the ground poses before; None: those that the state's own D says.
+        """
+        places, motion = part(state)
+        poses = code.decode(places) if begin is None else begin
+        if prior.schedule.at(level)[1] > SURE:
+            return state, poses
+        free = np.array(self.free, dtype=np.float64)
+        shares = free / free.sum().clip(1.0)
+        pair = PairMotion(motion.astype(np.float64) * prior.spread + prior.mean, np.asarray(poses, dtype=np.float64))
+        made, close = pair, (0, 0)
+        if self.meeting:
+            self.meeting.look(pair.places())
+            made = self._reaching(prior, self.meeting.near(made, shares), level)
+            close = self.meeting.close(motion.shape[1])
+        made = kept_apart(made, shares, still=self.still, close=close)
+        if made is pair:
+            return state, poses
+        # the difference: what is not sure yet is near 0, and must not become sure by this
+        places = (places + code.encode(made.poses) - code.encode(pair.poses)).astype(places.dtype)
+        return join(places, ((made.features - prior.mean) / prior.spread).astype(motion.dtype)), made.poses
+
+    def _reaching(self, prior: Prior, pair: PairMotion, level: int) -> PairMotion:
+        """The pair, with limbs that reach for what they are to touch."""
+        assert self.meeting is not None
+        features = pair.features.copy()
+        for i, goal in enumerate(self.meeting.goals(pair.places())):
+            if self.bends[i]:
+                own = goal.relative_to(GroundPose.of_numbers(pair.poses[i]))
+                standard = (features[i] - prior.mean) / prior.spread
+                features[i] = toward(own, prior)(standard, level) * prior.spread + prior.mean
+        return PairMotion(features, pair.poses)

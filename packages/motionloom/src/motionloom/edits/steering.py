@@ -4,6 +4,7 @@ The change is the mean of a Gaussian process given what the goal asks (Rasmussen
 velocity and the joints' places may be off by smooth curves of known size, joints that hang on the same limb together.
 Given the heading, places are linear in all of these, so the change is a product with matrices that only depend on
 which joints are asked when: nothing is differentiated, and the network does not know. Its next estimate does the rest.
+Only somebody who jumps leaves the floor, by no more than people do: what is too high is asked as high as they get.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.diffusion import Denoiser
-from motionloom.edits.reach import REACH, lowered, out_of_reach, room_above
 from motionloom.edits.stances import EASE, stilled
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
@@ -22,11 +22,82 @@ from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.goals.goal import Goal, turn_between
 from motionloom.ground import turned
 from motionloom.kinematics import costs
+from motionloom.kinematics.gestures import airborne
 from motionloom.motion import heading
 from motionloom.skeleton import SMPL22
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
+
+# Reach: how far a body goes up and down for what is asked of its joints, with its feet on the floor
+
+REACH = {j: (costs.beside(j, base), metres) for j, (base, metres) in costs.by_number(costs.REACH).items()}
+"""Of the joints of limbs: where the limb begins, and metres that it reaches."""
+_TIPTOE, _SHRUG, _JUMP = 0.07, 0.05, 0.38
+"""Metres that the ankles of somebody who stands go up, the shoulder of a raised arm, and somebody who jumps."""
+_FLYING = 0.1
+"""Metres that both feet are above the floor of somebody who jumps."""
+_HOPELESS = 1.0
+"""Metres down beyond which the body does not go along."""
+
+
+def _straight(line: Array, reach: float) -> Array:
+    """(frames,) metres: how high a limb reaches that is asked to go along these lines (frames, 3) from its base."""
+    return np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
+
+
+def room_above(places: Array) -> Array:
+    """(frames,) metres that the body can go up while its feet stay on the floor; more for somebody who jumps at all.
+
+    Args:
+        places: (frames, 22, 3) metres, +Y up, of somebody who is on the floor in a fifth of the frames or more.
+    """
+    room = np.full(len(places), np.inf)
+    for _, ankle, _ in costs.LEGS:
+        base, reach = REACH[ankle]
+        line, height = places[:, base] - places[:, ankle], places[:, ankle, 1]
+        above = (height - np.percentile(height, 20)).clip(0)
+        room = np.minimum(room, (_straight(line, reach) - line[:, 1]).clip(0) - above)
+    most = _TIPTOE + (_JUMP if airborne(places, clearance=_FLYING) else 0.0)
+    return (room + most).clip(0)
+
+
+def lowered(goal: Goal, places: Array, room: Array) -> Goal:
+    """The goal with what is too high for a body that goes up by ``room`` as high as it gets.
+
+    Where the height of the pelvis is asked all stays: it says by itself that somebody leaves the floor.
+
+    Args:
+        goal: in the frame of ``places``.
+        places: (frames, 22, 3) metres, +Y up.
+        room: (frames,) metres, as of `room_above`.
+    """
+    above = np.zeros(goal.positions.shape[:2])
+    for joint in (np.flatnonzero(goal.mask[:, 1:, 1].any(axis=0)) + 1).tolist():
+        base, reach = REACH.get(joint, (joint, costs.TRUNK_SLACK))
+        line = np.where(goal.mask[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
+        above[:, joint] = (line[:, 1] - _straight(line, reach) - room - _SHRUG).clip(0)
+    above[goal.mask[:, 0, 1]] = 0.0
+    return replace(goal, positions=goal.positions - above[..., None] * [0, 1, 0]) if above.any() else goal
+
+
+def out_of_reach(places: Array, goal: Goal) -> Array:
+    """(frames,) metres: how far up the body must go so that limbs reach what is above or below them.
+
+    Args:
+        places: (frames, 22, 3) metres, +Y up.
+        goal: in the same frame.
+    """
+    need = np.zeros(len(places))
+    for joint, (base, reach) in REACH.items():
+        asked = goal.mask[:, joint].all(axis=-1, keepdims=True)
+        line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
+        beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - _straight(line, reach)).clip(0)
+        need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
+    return np.where(need > -_HOPELESS, need, 0.0)
+
+
+# Steering
 
 Correction: TypeAlias = Callable[[np.ndarray, int], np.ndarray]
 """(standardised denoised estimate (frames, features) of one row, its level) -> the same, changed."""
@@ -210,17 +281,13 @@ def _offsets() -> Array:
     return offsets
 
 
-def _together() -> tuple[Array, Array, Array]:
-    """Covariances (22, 22) of the joints' changes on x, y and z, the root's path left out."""
-    limbs = _offsets() @ _offsets().T
-    return limbs, limbs + _HEIGHT**2 * np.outer(_CARRIED, _CARRIED), limbs
-
-
 _CARRIED = np.ones(len(SMPL22))
 """What goes up and down with the root: the feet stay, the knees bend."""
 _CARRIED[list(costs.numbers("knee"))] = 0.5
 _CARRIED[[*costs.numbers("ankle"), *costs.numbers("foot")]] = 0.0
-_TOGETHER = _together()
+_LIMBS_TOGETHER = _offsets() @ _offsets().T
+_TOGETHER = _LIMBS_TOGETHER, _LIMBS_TOGETHER + _HEIGHT**2 * np.outer(_CARRIED, _CARRIED), _LIMBS_TOGETHER
+"""Covariances (22, 22) of the joints' changes on x, y and z, the root's path left out."""
 
 
 # The change of one estimate

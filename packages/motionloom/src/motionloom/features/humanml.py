@@ -65,21 +65,21 @@ OFFSETS: Array = REST_DIRECTIONS * np.array([0.0, *HUMANML_BONE_LENGTHS])[:, Non
 # Positions to features
 
 
-def uniform(positions: np.ndarray, *, offsets: np.ndarray = OFFSETS) -> Array:
+def uniform(positions: np.ndarray) -> Array:
     """Put a motion of anybody on the uniform person: (frames, 22, 3) to the same, metres.
 
     The root path is scaled by the ratio of the leg lengths (thigh and shin of frame 0), every bone keeps its direction
-    and takes the target's length. (The published inverse and forward kinematics amount to that exactly.)
+    and takes the uniform one's length. (The published inverse and forward kinematics amount to that exactly.)
     """
     positions = _checked(positions)
     bones = positions[:, 1:] - positions[:, _PARENTS[1:]]
-    lengths = np.linalg.norm(offsets, axis=-1)
+    lengths = np.linalg.norm(OFFSETS, axis=-1)
     # the published code measures the legs by the largest coordinate of the rest offset, which lies on one axis
     legs = np.linalg.norm(bones[0, [4, 7]], axis=-1).sum()
     if legs < 1e-6:
         raise MotionloomError("the legs have no length in the first frame; these are not 22 body joints in metres")
     result = np.empty_like(positions)
-    result[:, 0] = positions[:, 0] * (np.abs(offsets[[5, 8]]).max(-1).sum() / legs)
+    result[:, 0] = positions[:, 0] * (np.abs(OFFSETS[[5, 8]]).max(-1).sum() / legs)
     bones = bones / np.linalg.norm(bones, axis=-1, keepdims=True).clip(1e-9) * lengths[1:, None]
     for j, p in enumerate(SMPL22.parents[1:], start=1):
         result[:, j] = result[:, p] + bones[:, j - 1]

@@ -135,9 +135,9 @@ class Place:
         return turned(positions, self.facing[..., None, None]) + self.origin[..., None, None, :]
 
 
-def with_bones(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> Array:
-    """(..., frames, joints, 3) with every bone as long as ``lengths`` (..., joints) say; the root stays."""
-    p, long = np.asarray(positions, dtype=np.float64), np.asarray(lengths)[..., None, :, None]
+def with_bones(positions: np.ndarray, parents: tuple[int, ...], *, like: np.ndarray) -> Array:
+    """(..., frames, joints, 3) with every bone as long as in the frames of ``like``, its mean; the root stays."""
+    p, long = np.asarray(positions, dtype=np.float64), bone_lengths(like, parents)[..., None, :, None]
     result = p.copy()
     for j, parent in enumerate(parents[1:], start=1):
         bone = p[..., j, :] - p[..., parent, :]

@@ -6,6 +6,7 @@ which one of several candidates is chosen (`motionloom.tasks.best`).
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -38,21 +39,24 @@ def asks_for_rest(text: str) -> bool:
 def checks_of(text: str) -> list[Check]:
     """What can be checked of the words of one action."""
     phrase = text.lower()
-    kinds, side = _kinds(phrase), re.findall(r"\b(left|right)\b", phrase)
-    one: Side = "" if len(set(side)) != 1 else "left" if side[0] == "left" else "right"
-    limb = bool(re.search(r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b", phrase))
-    checks = [_repetition_check(what, one if limb else "") for what in countable_actions(phrase)]
+    kinds, sides = _kinds(phrase), set(re.findall(r"\b(left|right)\b", phrase))
+    side: Side = "" if len(sides) != 1 else "left" if "left" in sides else "right"
+    sign, hands = 1 if side == "left" else -1, {"": (0, 1), "left": (0,), "right": (1,)}
+    limb = side if re.search(r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b", phrase) else ""
+    checks: list[Check] = [partial(_repeats, what, limb) for what in countable_actions(phrase)]
     if "turn" in kinds or re.search(r"\bturn", phrase):
-        checks += [_turn_check(one)] if one and not limb else []
-        checks += [_turns_round] if re.search(r"\b(?:around|round|about|180)\b", phrase) else []
+        if side and not limb:
+            checks.append(lambda p, fps: sign * turn(p) > _TURNS)
+        if re.search(r"\b(?:around|round|about|180)\b", phrase):
+            checks.append(lambda p, fps: abs(turn(p)) > _TURNS_ROUND)
     elif "locomotion" in kinds and not re.search(r"\b(?:in place|on (?:the|one) spot|treadmill)\b", phrase):
-        checks += _travel_checks(phrase, one)
+        checks.append(_travels(phrase, side))
     if re.search(r"\b(?:crouch|kneel|squat|sit down|sits down|sitting down|duck)", phrase):
         checks.append(lambda p, fps: float(pelvis_height(p).min()) < _LOW)
     if re.search(r"\b(?:rais|lift)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b", phrase):
-        checks.append(_raised_hand_check(one))
+        checks.append(lambda p, fps: bool(hands_height(p, over="neck")[:, hands[side]].max() > 0))
     if re.search(r"\bwav(?:e|es|ing)\b", phrase):
-        checks.append(_wave_check(one if limb else ""))
+        checks.append(lambda p, fps: max(wrist_swings(p, fps)[hand] for hand in hands[limb]) >= 3)
     return checks
 
 
@@ -61,41 +65,16 @@ def _kinds(phrase: str) -> set[str]:
     return {kind_of_verb(word, phrase) for word in words if base_of(word)}
 
 
-def _repetition_check(what: Counted, side: Side) -> Check:
-    return lambda p, fps: count(what, p, fps, side=side) > 0
+def _repeats(what: Counted, side: Side, p: np.ndarray, fps: float) -> bool:
+    return count(what, p, fps, side=side) > 0
 
 
-def _turn_check(side: Side) -> Check:
-    sign = 1 if side == "left" else -1
-    return lambda p, fps: sign * turn(p) > _TURNS
-
-
-def _turns_round(p: np.ndarray, fps: float) -> bool:
-    return abs(turn(p)) > _TURNS_ROUND
-
-
-def _travel_checks(phrase: str, side: Side) -> list[Check]:
+def _travels(phrase: str, side: Side) -> Check:
     if re.search(r"\b(?:backwards?|in reverse)\b", phrase):
-        return [lambda p, fps: displacement(p, fps).forward < -_GOES]
+        return lambda p, fps: displacement(p, fps).forward < -_GOES
     if side and re.search(r"\b(?:side|strafe)", phrase):
         sign = 1 if side == "left" else -1
-        return [lambda p, fps: sign * displacement(p, fps).left > _GOES]
+        return lambda p, fps: sign * displacement(p, fps).left > _GOES
     if re.search(r"\bforwards?\b", phrase):
-        return [lambda p, fps: displacement(p, fps).forward > _GOES]
-    return [lambda p, fps: travel(p, fps) > _GOES]
-
-
-def _raised_hand_check(side: Side) -> Check:
-    def raised(p: np.ndarray, fps: float) -> bool:
-        up = hands_height(p, over="neck").max(axis=0) > 0
-        return bool(up[0 if side == "left" else 1] if side else up.any())
-
-    return raised
-
-
-def _wave_check(side: Side) -> Check:
-    def waved(p: np.ndarray, fps: float) -> bool:
-        swings = wrist_swings(p, fps)
-        return (max(swings) if not side else swings[0 if side == "left" else 1]) >= 3
-
-    return waved
+        return lambda p, fps: displacement(p, fps).forward > _GOES
+    return lambda p, fps: travel(p, fps) > _GOES

@@ -6,7 +6,7 @@ a JSON Schema.
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,6 @@ from motionloom.errors import MotionloomError, listed
 from motionloom.features.humanml import resample_positions
 from motionloom.goals.drawing import read_drawing
 from motionloom.goals.fields import Field, value
-from motionloom.goals.following import follow, tracks
 from motionloom.goals.goal import FPS, Goal, merged, start_of, turn_between
 from motionloom.goals.paths import WALKING, curve, lengths_along, root_path, through, turned_to
 from motionloom.goals.reach import check_reach
@@ -25,7 +24,7 @@ from motionloom.goals.schemas import GOAL_JOINTS
 from motionloom.ground import GroundPose
 from motionloom.io import load
 from motionloom.io.text import read_text
-from motionloom.motion import ground_pose
+from motionloom.motion import Motion, ground_pose
 from motionloom.requests import goal as keys
 from motionloom.requests.goal import FARTHEST, MAX_FRAMES
 from motionloom.retarget import to_smpl22
@@ -395,3 +394,38 @@ def _one_or_many(item: Field | None) -> list[Field]:
 
 def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else float(np.radians(degrees))
+
+
+# Other motions as goals: where the joints of a recording are, for somebody else to follow
+
+
+def follow(motion: Motion, joints: Sequence[str], *, frames: int, at: Sequence[float] | None = None) -> Goal:
+    """The places of joints (or groups) of a motion of any humanoid, as a goal of so many frames at 20 fps.
+
+    The motion is put on the uniform person first; places are those in its world, and the goal starts where its person
+    stands. at: seconds, each within the motion; None: every frame that the motion has. Raises `MotionloomError` for
+    an unknown joint or a time that either of the two does not have.
+    """
+    chosen = list(SMPL22.resolve(joints))
+    positions = resample_positions(to_smpl22(motion).positions(), motion.fps)
+    return tracks(positions, chosen, frames=frames, at=at)
+
+
+def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Sequence[float] | None) -> Goal:
+    """`follow` for joints, by number, of places (n, 22, 3) at 20 fps."""
+    known = min(len(positions), frames)
+    if at is None:
+        rows = np.arange(known)
+    else:
+        rows = np.array([round(time * FPS) for time in at], dtype=int)
+        if len(rows) == 0 or rows.min() < 0 or rows.max() > known:
+            raise MotionloomError(
+                f"a motion can be followed at 0 to {(known - 1) / FPS:g} s here; got "
+                f"{', '.join(f'{t:g}' for t in at[:20]) or 'none'}"
+            )
+        rows = np.minimum(rows, known - 1)
+    goal = Goal.nothing(frames)
+    for joint in joints:
+        goal.positions[rows, joint] = positions[rows, joint]
+        goal.mask[rows, joint] = True
+    return replace(goal, start=ground_pose(positions[0]))

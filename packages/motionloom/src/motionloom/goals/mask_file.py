@@ -4,24 +4,19 @@
 them as a JSON Schema. JSON is YAML, so both are read.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from motionloom.errors import MotionloomError, meant
-from motionloom.goals.lined_file import LinedFile
+from motionloom.goals.fields import LinedFile
+from motionloom.goals.hold import FixedPart
 from motionloom.goals.schemas import MASK_JOINTS
 from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.io.text import shown
 from motionloom.requests.mask import MASK, MAX_FRAME, PART
 from motionloom.skeleton import SMPL22
-
-if TYPE_CHECKING:
-    from motionloom.goals.hold import FixedPart
 
 MAX_BYTES = 4_000_000
 BESIDE = 0.25
@@ -84,8 +79,6 @@ class _Reader(LinedFile):
         return tuple(self.part(item) for item in self.items(top["hold"], "hold", most=MASK["hold"].many))
 
     def part(self, item: Lined) -> FixedPart:
-        from motionloom.goals.hold import FixedPart
-
         entries = self.mapping(item, tuple(PART), "a held part")
         if "joints" not in entries:
             self.fail(item.line, "a held part has no 'joints'; name joints, groups or root")

@@ -1,19 +1,16 @@
 """Remarks on words before anything is generated: how they are read, that they are not English or not known."""
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from motionloom.goals.contact import read_contact
-from motionloom.goals.english import is_english
 from motionloom.goals.roles import MARK, prompts_of, without_two
+from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import subject_of
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
-
-if TYPE_CHECKING:
-    from motionloom.goals.timeline import Timeline
 
 
 @dataclass(frozen=True)
@@ -26,28 +23,14 @@ class Remark:
     """The nearest sentences that are known."""
 
 
-_LIGHT = frozenset(
-    map(
-        stem,
-        re.findall(
-            "[a-z]+",
-            """do does make take play perform give use put ride go goes get start begin come
-    throw have""",
-        ),
-    )
-)
+_LIGHT_WORDS = "do does make take play perform give use put ride go goes get start begin come throw have"
 """Verbs that say what is done only with the word behind them: "plays golf"."""
-_SMALL = frozenset(
-    re.findall(
-        "[a-z]+",
-        """a an the his her its their and or of to in on at with from over up down for as
-    by into is are was be this that one two three something somebody someone very like out off around through across
-    while""",
-    )
-)
+_FUNCTION_WORDS = """a an the his her its their and or of to in on at with from over up down for as by into is are was
+be this that one two three something somebody someone very like out off around through across while"""
+_LIGHT, _FUNCTION = frozenset(map(stem, _LIGHT_WORDS.split())), frozenset(_FUNCTION_WORDS.split())
 
 
-def numbers_read(timeline: "Timeline") -> str:
+def numbers_read(timeline: Timeline) -> str:
     """A line with the numbers that were read in the words of a timeline, and the seconds of each; empty for none."""
     readings = [
         f"{one.amount}, {sum(segment.seconds for segment in timeline.segments[one.first : one.end]):g} s"
@@ -56,7 +39,7 @@ def numbers_read(timeline: "Timeline") -> str:
     return f"read as: {'; '.join(readings)}" if readings else ""
 
 
-def parts_read(timeline: "Timeline") -> str:
+def parts_read(timeline: Timeline) -> str:
     """A line with the actions that a sentence was parted into; empty for one action, repeated or not."""
     if len(timeline.segments) < 2:
         return ""
@@ -121,8 +104,41 @@ def verb_words(text: str) -> tuple[str, ...]:
     sentence = bare(text)
     subject = subject_of(sentence)
     rest = sentence[len(subject) :] if len(sentence) > len(subject) else sentence
-    words = [word for word in re.findall(r"[a-z]+(?:-[a-z]+)*", rest) if word not in _SMALL and not word.endswith("ly")]
+    words = [
+        word for word in re.findall(r"[a-z]+(?:-[a-z]+)*", rest) if word not in _FUNCTION and not word.endswith("ly")
+    ]
     first, *more = words or [""]
     if stem(first) in _LIGHT:
         return tuple(re.findall("[a-z]+", more[0])[:1]) if more else ()
     return tuple(re.findall("[a-z]+", first)[:1])
+
+
+# Whether a prompt is English: the weights have read nothing else. By letters (another alphabet), and by the small words
+# that every sentence of a language has; where there is nothing to go by a prompt counts as English.
+
+_ENGLISH_WORDS = """the and is are to with his her he she they their of on from while then up down forward walks runs
+person someone this that for by into out around back left right hand hands at as it its be was were"""
+_OTHER_WORDS = """
+der das ein eine einen einem einer und ist nach mit auf sich dann geht läuft springt seine ihre beiden vorwärts
+het een naar zijn haar met loopt vooruit iemand och ett sig går springer framåt og fremad hopper mann kvinne
+les une et avec puis vers dans qui marche saute homme femme personne
+las una con hacia camina salta corre persona hombre mujer luego su
+il lo gli che poi cammina avanti uomo donna um uma com para pessoa homem mulher anda
+się idzie skacze osoba człowiek jde skáče bir ve adam yürüyor kişi ileri
+"""
+"""German; Dutch and Scandinavian; French; Spanish; Italian and Portuguese; Polish, Czech and Turkish."""
+_SMALL_WORDS = "la le el en y e i du des se na los w z"
+"""Words that names and borrowed phrases have too: they count only beside another."""
+_ENGLISH, _OTHERS, _SMALL = (frozenset(words.split()) for words in (_ENGLISH_WORDS, _OTHER_WORDS, _SMALL_WORDS))
+
+
+def is_english(text: str) -> bool:
+    """Whether a prompt can be English; False where its letters or its small words are those of another language."""
+    letters = [letter for letter in text if letter.isalpha()]
+    latin = sum(unicodedata.name(letter, "").startswith("LATIN") for letter in letters)
+    if len(letters) >= 2 and latin < 0.7 * len(letters):
+        return False
+    words = re.findall(r"[^\W\d_]+", text.lower())
+    other = sum(word in _OTHERS for word in words)
+    small = sum(word in _SMALL for word in words)
+    return not (other and other + small >= 2 and other + small > sum(word in _ENGLISH for word in words))

@@ -4,37 +4,41 @@
 them as a JSON Schema.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.fields import Field
-from motionloom.goals.lined_file import LinedFile
+from motionloom.formats import readable
+from motionloom.goals.adapters import MOST_ADAPTERS, parse_adapter
+from motionloom.goals.amounts import (
+    CHAINED,
+    STROKES,
+    Amount,
+    goal_for,
+    read_amount,
+    read_seconds,
+    seconds_for,
+    single_stroke,
+)
+from motionloom.goals.fields import Field, LinedFile
+from motionloom.goals.goal import FPS, Goal, merged
+from motionloom.goals.goal_file import read_goal
+from motionloom.goals.segment import TRANSITION, Segment
+from motionloom.goals.sequence import Part, lengths, split_actions
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
 from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
 from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys, usual_seconds
 
-if TYPE_CHECKING:
-    from motionloom.goals.amounts import Amount
-    from motionloom.goals.goal import Goal
-    from motionloom.goals.segment import Segment
-    from motionloom.goals.sequence import Part
-
-TRANSITION = 1.0
-"""What two neighbours share where the file does not say."""
 TIMELINE, SEGMENT = specs(TimelineKeys), specs(SegmentKeys)
 SHORTEST = SEGMENT["seconds"].low
 MAX_SEGMENTS = MAX_ITEMS
 MAX_GOAL_FRAMES = 1_000_000
 """Frames with targets in one timeline, 0.6 GB of them."""
-FPS = 20.0
 
 
 @dataclass(frozen=True)
@@ -120,8 +124,6 @@ def timeline_from(value: Any, *, folder: Path) -> Timeline:
 
 def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition: float | None = None) -> Timeline:
     """A timeline of equally long segments; `MotionloomError` for what a file could not ask either."""
-    from motionloom.goals.segment import Segment
-
     if not texts:
         raise MotionloomError("there is no segment; say what the person does, such as: motionloom compose walk jump")
     if len(texts) > MAX_SEGMENTS:
@@ -141,8 +143,6 @@ def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition
 
 def single_segment(text: str, seconds: float) -> Timeline:
     """One segment, of any length that one motion may have."""
-    from motionloom.goals.segment import Segment
-
     return Timeline((Segment(text, seconds),))
 
 
@@ -154,8 +154,6 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
     lengths and goals of their segments (`motionloom.goals.amounts`). metre: as of `goal_file.read_goal`, of metres in
     the words. Raises `MotionloomError` for an impossible request.
     """
-    from motionloom.goals.sequence import split_actions
-
     if problem := _text_problem(text):
         raise MotionloomError(problem)
     parts = split_actions(text)
@@ -166,9 +164,6 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
 
 def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre: float) -> Timeline:
     """As long as the numbers in the words need, with their goals; without one as `_timeline_of_parts`."""
-    from motionloom.goals.amount_goal import seconds_for
-    from motionloom.goals.amounts import read_amount, read_seconds
-
     read = [amount and replace(amount, metre=metre) for amount in (read_amount(part.text) for part in parts)]
     amounts = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
     own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, amounts, strict=True)]
@@ -191,9 +186,6 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
 
     share: of the way of steps, and of the time of a stroke, where another than the usual comes nearer to the number.
     """
-    from motionloom.goals.amount_goal import CHAINED, STROKES, goal_for
-    from motionloom.goals.amounts import single_stroke
-
     if amount.kind != "count":
         scaled = replace(amount, stride=amount.stride * share)
         return (replace(segment, goal=goal_for(scaled, segment.seconds)),)
@@ -208,9 +200,6 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
 
 
 def _timeline_of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
-    from motionloom.goals.segment import Segment
-    from motionloom.goals.sequence import lengths
-
     if len(parts) == 1:
         return plain_timeline([text], seconds=usual_seconds(text) if seconds is None else seconds)
     if seconds is not None and not SHORTEST * len(parts) <= seconds <= LONGEST:
@@ -294,6 +283,9 @@ class _Reader(LinedFile):
             self.fail(entries["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
         seconds = self.field(entries, SEGMENT, "seconds")
         transition = entries.get("transition")
+        goals = (entries["goal"],) if "goal" in entries else ()
+        if "goals" in entries:
+            goals = tuple(self.items(entries["goals"], "goals", of="goal"))
         return _Row(
             item.line,
             self.text(entries["text"]),
@@ -301,7 +293,7 @@ class _Reader(LinedFile):
             self.field(entries, SEGMENT, "guidance"),
             self.field(entries, SEGMENT, "transition"),
             transition.line if transition else 0,
-            self.goals(entries),
+            goals,
             self.adapters(entries.get("adapters")),
         )
 
@@ -309,8 +301,6 @@ class _Reader(LinedFile):
         """``FILE`` or ``FILE:FACTOR``, one or a list of them; the files lie in the timeline's folder."""
         if node is None:
             return ()
-        from motionloom.goals.adapters import MOST_ADAPTERS, parse_adapter
-
         items = [node] if isinstance(node.value, str) else self.items(node, "adapters", of="adapter")
         if len(items) > MOST_ADAPTERS:
             self.fail(node.line, f"{len(items)} adapters at once are too many; at most {MOST_ADAPTERS}")
@@ -324,13 +314,6 @@ class _Reader(LinedFile):
             except MotionloomError as error:
                 self.fail(one.line, str(error))
         return tuple(result)
-
-    def goals(self, entries: dict[str, Lined]) -> tuple[Lined, ...]:
-        if "goal" in entries:
-            return (entries["goal"],)
-        if "goals" not in entries:
-            return ()
-        return tuple(self.items(entries["goals"], "goals", of="goal"))
 
     def transitions(self, rows: list[_Row], shared: float | None) -> list[float]:
         """Each segment's transition to the next; one that is not requested is shortened to what fits."""
@@ -350,8 +333,6 @@ class _Reader(LinedFile):
         return result
 
     def segments(self, rows: list[_Row], transitions: list[float]) -> tuple[Segment, ...]:
-        from motionloom.goals.segment import Segment
-
         def segment(row: _Row, transition: float) -> Segment:
             goal = self.merged(row.goals, _frames(row.seconds))
             return Segment(row.text, row.seconds, row.guidance, transition, goal, row.adapters)
@@ -361,8 +342,6 @@ class _Reader(LinedFile):
     def merged(self, goals: tuple[Lined, ...], frames: int) -> Goal | None:
         if not goals:
             return None
-        from motionloom.goals.goal import merged
-
         whole = self.goal(goals[0], "goal", frames)
         for other in goals[1:]:
             try:
@@ -372,8 +351,6 @@ class _Reader(LinedFile):
         return whole
 
     def goal(self, node: Lined, name: str, frames: int) -> Goal:
-        from motionloom.goals.goal_file import read_goal
-
         what: Any = node.value
         if isinstance(what, str):
             what = self.file(node, name)
@@ -392,8 +369,6 @@ class _Reader(LinedFile):
     def start(self, node: Lined | None) -> Path | None:
         if node is None:
             return None
-        from motionloom.formats import readable
-
         place = self.file(node, "start")
         if place.suffix.lower() not in readable():
             self.fail(node.line, f"'start' must name a motion, one of {', '.join(readable())}; got {self.kind(node)}")

@@ -58,11 +58,8 @@ def subject_of(clause: str) -> str:
             while len(before) > 1 and re.fullmatch(r"\w+ly|then", before[-1]):
                 before = before[:-1]
             return " ".join(before)
-    return words[0] if re.fullmatch(r"someone|somebody|he|she|they", words[0], re.I) else _article(words)
-
-
-def _article(words: list[str]) -> str:
-    """The article and its noun where no verb is known."""
+    if re.fullmatch(r"someone|somebody|he|she|they", words[0], re.IGNORECASE):
+        return words[0]
     return " ".join(words[:2]) if len(words) > 2 and re.fullmatch(r"a|an|the", words[0], re.IGNORECASE) else ""
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.lined_file import LinedFile
+from motionloom.goals.fields import LinedFile
 from motionloom.goals.roles import prompts_of
 from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.live.commands import Command, Say, from_json, person_of, to_json

@@ -7,7 +7,8 @@ themselves, so that nothing but these bytes is needed: field numbers are those o
 
 import math
 import struct
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias
@@ -49,105 +50,71 @@ def outline(data: bytes) -> Outline:
     """Check a graph and give its names; raises ValueError for what is no graph or may not be run."""
     if len(data) > MAX_BYTES:
         raise ValueError(f"a graph of {len(data)} bytes, more than {MAX_BYTES}")
-    graphs: list[memoryview] = []
-    for number, value in fields(memoryview(data)):
-        if number == 7:
-            graphs.append(_part(value))
-        elif number == 8:
-            _check_opset(_part(value))
-        elif number not in (1, 2, 3, 4, 5, 6, 14):
-            raise ValueError(f"a model with the part {number}, which none here has")
-    if len(graphs) != 1:
+    model = _parts(memoryview(data), "a model with the part {}, which none here has", (1, 2, 3, 4, 5, 6, 7, 8, 14))
+    for opset in model[8]:
+        _check_domain(_parts(_part(opset))[1], "operators of {!r}, which are not ONNX's own")
+    if len(model[7]) != 1:
         raise ValueError("no ONNX graph")
-    return _outline(graphs[0])
+    graph = _parts(_part(model[7][0]), "a graph with the part {}, which none here has", (1, 2, 5, 10, 11, 12, 13))
+    initialisers = [_initialiser(_part(tensor)) for tensor in graph[5]]
+    constants = sum(_check_node(_part(node)) for node in graph[1]) + sum(inside for _, _, inside in initialisers)
+    if len(graph[1]) > MAX_NODES or constants > MAX_CONSTANTS:
+        raise ValueError("a graph too large")
+    inputs, outputs = (tuple(_name(_part(value)) for value in graph[number]) for number in (11, 12))
+    return Outline(inputs, outputs, {name: shape for name, shape, _ in initialisers if shape is not None})
 
 
-def _outline(graph: memoryview) -> Outline:
-    names: dict[int, list[str]] = {11: [], 12: []}
-    weights: dict[str, tuple[int, ...]] = {}
-    nodes = constants = 0
-    for number, value in fields(graph):
-        if number == 1:
-            nodes += 1
-            constants += _check_node(_part(value))
-        elif number == 5:
-            name, shape, inside = _initialiser(_part(value))
-            constants += inside
-            if shape is not None:
-                weights[name] = shape
-        elif number in names:
-            names[number].append(_name(_part(value)))
-        elif number not in (2, 10, 13):
-            raise ValueError(f"a graph with the part {number}, which none here has")
-        if nodes > MAX_NODES or constants > MAX_CONSTANTS:
-            raise ValueError("a graph too large")
-    return Outline(tuple(names[11]), tuple(names[12]), weights)
+def _parts(message: memoryview, problem: str = "", known: Collection[int] = ()) -> dict[int, list[Field]]:
+    """The values of a message by the numbers of their fields; a ``problem`` for those that are not ``known``."""
+    values: dict[int, list[Field]] = defaultdict(list)
+    for number, value in fields(message):
+        if problem and number not in known:
+            raise ValueError(problem.format(number))
+        values[number].append(value)
+    return values
 
 
-def _check_opset(opset: memoryview) -> None:
-    for number, value in fields(opset):
-        if number == 1 and bytes(_part(value)) not in (b"", b"ai.onnx"):
-            raise ValueError(f"operators of {_text(value)!r}, which are not ONNX's own")
+def _check_domain(names: Sequence[Field], problem: str) -> None:
+    for name in names:
+        if bytes(_part(name)) not in (b"", b"ai.onnx"):
+            raise ValueError(problem.format(_text(name)))
 
 
 def _check_node(node: memoryview) -> int:
     """Bytes of the constants in a node."""
-    inside = 0
-    for number, value in fields(node):
-        if number == 4 and _text(value) not in OPERATORS:
-            raise ValueError(f"the operator {_text(value)!r}, which no network here has")
-        if number == 7 and bytes(_part(value)) not in (b"", b"ai.onnx"):
-            raise ValueError(f"an operator of {_text(value)!r}, which is not ONNX's own")
-        if number == 5:
-            inside += _check_attribute(_part(value))
-    return inside
-
-
-def _check_attribute(attribute: memoryview) -> int:
-    inside = 0
-    for number, value in fields(attribute):
-        if number == 5:
-            _, shape, size = _initialiser(_part(value))
+    parts, inside = _parts(node), 0
+    for operator in parts[4]:
+        if _text(operator) not in OPERATORS:
+            raise ValueError(f"the operator {_text(operator)!r}, which no network here has")
+    _check_domain(parts[7], "an operator of {!r}, which is not ONNX's own")
+    for attribute in parts[5]:
+        problem = "an attribute of the kind {}, which no network here has"
+        for tensor in _parts(_part(attribute), problem, (1, 2, 3, 4, 5, 7, 8, 13, 20))[5]:
+            _, shape, size = _initialiser(_part(tensor))
             inside += size
             if shape is not None:
                 raise ValueError("a constant that lies elsewhere")
-        elif number not in (1, 2, 3, 4, 7, 8, 13, 20):
-            raise ValueError(f"an attribute of the kind {number}, which no network here has")
     return inside
 
 
 def _initialiser(tensor: memoryview) -> tuple[str, tuple[int, ...] | None, int]:
     """Name, shape where the numbers are to be had from the weight file, and bytes of what is inside."""
-    shape: list[int] = []
-    name, kind, elsewhere, places = "", 0, False, []
-    raw = b""
-    whole: list[int] = []
-    for number, value in fields(tensor):
-        if number == 1:
-            shape += _numbers(value)
-        elif number == 2:
-            kind = _whole(value)
-        elif number == 8:
-            name = _text(value)
-        elif number == 9:
-            raw = bytes(_part(value))
-        elif number in (5, 7):
-            whole += _numbers(value)
-        elif number == 13:
-            places.append(dict(fields(_part(value))))
-        elif number == 14:
-            elsewhere = _whole(value) != 0
-        elif number not in (4, 12):
-            raise ValueError(f"a tensor with the part {number}, which none here has")
+    known = (1, 2, 4, 5, 7, 8, 9, 12, 13, 14)
+    parts = _parts(tensor, "a tensor with the part {}, which none here has", known)
+    name, raw = ["", *map(_text, parts[8])][-1], bytes([memoryview(b""), *map(_part, parts[9])][-1])
+    kind, elsewhere = ([0, *map(_whole, parts[number])][-1] for number in (2, 14))
+    shape = [size for value in parts[1] for size in _numbers(value)]
     if any(not 0 <= size <= 1 << 24 for size in shape) or math.prod(shape) > 1 << 28:
         raise ValueError(f"a tensor {name!r} of the shape {shape}")
-    if elsewhere or places:
-        said = [(_text(place.get(1, b"")), _text(place.get(2, b""))) for place in places]
+    if elsewhere or parts[13]:
+        places = [dict(fields(_part(value))) for value in parts[13]]
+        nothing = memoryview(b"")
+        said = [(_text(place.get(1, nothing)), _text(place.get(2, nothing))) for place in places]
         if said != [("location", LOCATION)] or kind != _FLOAT or raw:
             raise ValueError(f"a tensor {name!r} that lies in another file")
         return name, tuple(shape), 0
     if kind in (_INT32, _INT64):
-        _check_whole(whole + _unpacked(raw, kind))
+        _check_whole([number for value in parts[5] + parts[7] for number in _numbers(value)] + _unpacked(raw, kind))
     return name, None, len(tensor)
 
 
@@ -171,10 +138,10 @@ def _text(value: Field) -> str:
     return bytes(_part(value)).decode("utf-8", "replace")[:100]
 
 
-def _part(value: "Field | bytes") -> memoryview:
+def _part(value: Field) -> memoryview:
     if isinstance(value, int):
         raise ValueError("a number where there should be a part")
-    return memoryview(value)
+    return value
 
 
 def _whole(value: Field) -> int:

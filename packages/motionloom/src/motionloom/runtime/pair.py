@@ -19,7 +19,7 @@ from motionloom.features.pair import PairMotion, PlaceCode
 from motionloom.runtime.prior import HELD, Inputs, PriorSession
 from motionloom.runtime.prior_condition import Bound, Condition, Floats
 from motionloom.runtime.session import Session
-from motionloom.runtime.sizes import NetConfig
+from motionloom.runtime.sizes import NetConfig, are_sizes
 
 PLACE = 4
 """Numbers of D per person."""
@@ -45,13 +45,11 @@ class PairConfig:
     places: PlaceCode = field(default_factory=PlaceCode)
 
     def __post_init__(self) -> None:
-        numbers = (self.layers, self.width, self.heads, self.hidden)
-        whole = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in numbers)
-        split = isinstance(self.split, int) and not isinstance(self.split, bool) and 0 <= self.split <= 256
+        whole = are_sizes(self.layers, self.width, self.heads, self.hidden) and self.layers <= 16
+        split = type(self.split) is int and 0 <= self.split <= 256
         flags = self.adds in ("all", "condition") and isinstance(self.aware, bool)
-        if not (whole and split and flags) or self.layers > 16 or self.width % self.heads:
-            raise MotionloomError(f"the communication block's sizes are not usable: {asdict(self)}")
-        if isinstance(self.dropout, bool) or not isinstance(self.dropout, int | float) or not 0 <= self.dropout < 1:
+        dropout = type(self.dropout) in (int, float) and 0 <= self.dropout < 1
+        if not (whole and split and flags and dropout) or self.width % self.heads:
             raise MotionloomError(f"the communication block's sizes are not usable: {asdict(self)}")
 
     @staticmethod

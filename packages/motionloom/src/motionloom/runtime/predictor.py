@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from motionloom.errors import MotionloomError
 from motionloom.runtime.prior_condition import Floats
 from motionloom.runtime.session import Session
+from motionloom.runtime.sizes import are_sizes
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,8 @@ class PredictorConfig:
 
     def __post_init__(self) -> None:
         sizes = (self.channels, self.kept, self.layers, self.width, self.heads, *self.condition_shape)
-        small = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in sizes)
-        small = small and isinstance(self.beside, bool) and self.layers <= 128
-        if not small or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
+        whole = are_sizes(*sizes) and isinstance(self.beside, bool) and self.layers <= 128
+        if not whole or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
         if self.layers % 2:
             raise MotionloomError(
@@ -56,12 +56,10 @@ class PredictorConfig:
         Raises MotionloomError.
         """
         try:
-            settings: dict[str, Any] = {
-                {"told": "condition"}.get(key, key): value for key, value in dict(values).items()
-            }
-            if settings.get("condition") is not None:
-                settings["condition"] = settings["condition"][0], settings["condition"][1]
-            return PredictorConfig(**settings)
+            settings = dict(values)
+            condition = settings.pop("condition", settings.pop("told", None))
+            shape = None if condition is None else (condition[0], condition[1])
+            return PredictorConfig(**settings, condition=shape)
         except (TypeError, ValueError, IndexError, KeyError) as error:
             raise MotionloomError(f"the network's settings are not usable: {error}") from None
 

@@ -87,7 +87,8 @@ class PriorSession:
         return self._inputs.frames(tokens, state.shape[1])
 
     def show(self, bound: Bound, given: Floats, mask: NDArray[np.bool_]) -> Bound:
-        """The condition with what is given (rows, frames, features) where the mask is True, if it can be shown."""
+        """The condition with what is given (rows, frames, features), standardised, where the mask is True, if it can be
+        shown; what is not given may be anything finite."""
         if self.given is None:
             return bound
         seen = np.concatenate([np.where(mask, given, 0.0), mask], axis=-1, dtype=np.float32)
@@ -113,7 +114,8 @@ class Inputs:
         fixed = self._fixed(bound, rows, frames)
         state = np.asarray(state, np.float32)
         if self.config.flags:
-            state = np.concatenate([state, self._flags(bound, rows, frames)], axis=-1)
+            flags = bound.flags if bound.flags.shape[1] else np.zeros((rows, frames), np.int64)
+            state = np.concatenate([state, np.asarray(self.weights["net.flag.weight"], np.float32)[flags]], axis=-1)
         if self.config.patch > 1 and not fixed["frames"].all():
             state = state * fixed["frames"][:, :frames, None]  # a token may be part motion and part padding
         levels = np.full(rows, level, np.int64) if np.ndim(level) == 0 else np.asarray(level, np.int64)
@@ -142,10 +144,6 @@ class Inputs:
         }
         self._masks["last"] = bound, (rows, frames), made
         return made
-
-    def _flags(self, bound: Bound, rows: int, frames: int) -> Floats:
-        flags = bound.flags if bound.flags.shape[1] else np.zeros((rows, frames), np.int64)
-        return np.asarray(self.weights["net.flag.weight"], np.float32)[flags]
 
 
 def valid_frames(lengths: NDArray[np.int64], frames: int) -> NDArray[np.bool_]:

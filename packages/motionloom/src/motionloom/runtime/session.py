@@ -71,12 +71,8 @@ class Session:
         """
         self.device, self.threads, self._seldom = device, threads(), seldom
         self._graph, self._weights = graph, weights
-        self._made: _Made | None = None
-        self._making = threading.Lock()
-
-    def on(self, device: str) -> "Session":
-        """The same on another device."""
-        return Session(self._graph, self._weights, device=find_device(device), seldom=self._seldom)
+        self._made: tuple[Any, Outline] | None = None
+        self._making, self._own = threading.Lock(), threading.local()
 
     def run(self, feeds: Mapping[str, np.ndarray], *, held: Sequence[str] = ()) -> list[np.ndarray]:
         """The graph's answers, new arrays, in their order.
@@ -87,61 +83,53 @@ class Session:
         Raises MotionloomError where the graph cannot be run.
         """
         with self._making:
-            if self._made is None:
-                self._made = _Made(self._graph, self._weights(), self.device, self.threads, seldom=self._seldom)
-        return self._made.run(feeds, held)
+            self._made = self._made or self._make()
+        session, names = self._made
+        try:
+            if not hasattr(self._own, "io"):
+                self._own.io, self._own.held = session.io_binding(), {}
+            io = self._own.io
+            for name in names.inputs:
+                io.bind_ortvalue_input(name, self._brought(name, feeds[name], name in held))
+            for name in names.outputs:
+                io.bind_output(name, "cpu")
+            session.run_with_iobinding(io)
+            return io.copy_outputs_to_cpu()
+        except Exception as error:
+            raise _refused(error) from None
 
-
-class _Made:
-    """A session of ONNX Runtime, with buffers for each thread that runs it."""
-
-    def __init__(
-        self, graph: bytes, weights: Mapping[str, np.ndarray], device: str, count: int, *, seldom: bool
-    ) -> None:
+    def _make(self) -> "tuple[Any, Outline]":
+        """A session of ONNX Runtime, and the names of its graph."""
         import onnxruntime
 
-        self._ort: Any = onnxruntime
-        kind, _, number = device.partition(":")
-        self._device, self._number = kind, int(number or 0)
-        names = check_graph(graph, weights)
+        weights = self._weights()
+        names = check_graph(self._graph, weights)
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads, options.inter_op_num_threads = count, 1
+        options.intra_op_num_threads, options.inter_op_num_threads = self.threads, 1
         options.log_severity_level = 4
         # threads that wait for the next call in a loop take the processors from NumPy's part between two calls
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         arrays = {name: np.ascontiguousarray(weights[name], np.float32) for name in names.weights}
         values = [onnxruntime.OrtValue.ortvalue_from_numpy(array) for array in arrays.values()]
         options.add_external_initializers(list(arrays), values)  # which copies them when the session is made
-        if seldom:
+        if self._seldom:
             options.add_session_config_entry("session.disable_prepacking", "1")
+        kind, _, number = self.device.partition(":")
         try:
-            provider = DEVICES[kind] if kind == "cpu" else (DEVICES[kind], {"device_id": self._number})
-            self._session = onnxruntime.InferenceSession(graph, options, providers=[provider])
-        except Exception as error:
-            raise _refused(error) from None
-        self._inputs, self._outputs = names.inputs, names.outputs
-        self._own = threading.local()
-
-    def run(self, feeds: Mapping[str, np.ndarray], held: Sequence[str]) -> list[np.ndarray]:
-        try:
-            if not hasattr(self._own, "io"):
-                self._own.io, self._own.held = self._session.io_binding(), {}
-            io = self._own.io
-            for name in self._inputs:
-                io.bind_ortvalue_input(name, self._brought(name, feeds[name], name in held))
-            for name in self._outputs:
-                io.bind_output(name, "cpu")
-            self._session.run_with_iobinding(io)
-            return io.copy_outputs_to_cpu()
+            provider = DEVICES[kind] if kind == "cpu" else (DEVICES[kind], {"device_id": int(number or 0)})
+            return onnxruntime.InferenceSession(self._graph, options, providers=[provider]), names
         except Exception as error:
             raise _refused(error) from None
 
     def _brought(self, name: str, array: np.ndarray, held: bool) -> Any:
         """The array as a value on the session's device."""
+        import onnxruntime
+
         kept: dict[str, tuple[np.ndarray, Any]] = self._own.held
         if held and name in kept and kept[name][0] is array:
             return kept[name][1]
-        value = self._ort.OrtValue.ortvalue_from_numpy(np.ascontiguousarray(array), self._device, self._number)
+        kind, _, number = self.device.partition(":")
+        value = onnxruntime.OrtValue.ortvalue_from_numpy(np.ascontiguousarray(array), kind, int(number or 0))
         if held:
             kept[name] = array, value
         return value

@@ -6,6 +6,11 @@ from typing import Any, Literal
 from motionloom.errors import MotionloomError
 
 
+def are_sizes(*numbers: Any, most: int = 8192) -> bool:
+    """Whether all are whole numbers of 1 to ``most``."""
+    return all(type(number) is int and 0 < number <= most for number in numbers)
+
+
 @dataclass(frozen=True)
 class NetConfig:
     """Sizes of a prior network; the defaults are the published HumanML3D model."""
@@ -32,15 +37,9 @@ class NetConfig:
         numbers = (self.features, self.width, self.layers, self.heads, self.hidden, self.text, self.patch)
         if self.variant not in ("published", "modulated"):
             raise MotionloomError(f"no network variant {self.variant!r}; there are published and modulated")
-        if (
-            any(type(n) is not int or not 0 < n <= 65536 for n in numbers)
-            or self.layers > 256
-            or self.width % self.heads
-            or not isinstance(self.flags, bool)
-            or not isinstance(self.clock, bool)
-        ):
-            raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
-        if (self.width // self.heads) % 2 or not 0 <= self.dropout < 1:
+        flags = isinstance(self.flags, bool) and isinstance(self.clock, bool)
+        whole = flags and are_sizes(*numbers, most=65536) and self.layers <= 256
+        if not whole or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
 
     @staticmethod

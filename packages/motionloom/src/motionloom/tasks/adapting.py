@@ -1,8 +1,7 @@
 """Adapters trained on clips, merged into a prior by file and factor, for the whole or segment by segment."""
 
-from collections import OrderedDict
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
@@ -29,20 +28,8 @@ def load_adapters(prior: Prior, adapters: Sequence[Applied]) -> tuple[tuple[Adap
     return tuple((Adapter.load(one, prior) if isinstance(one, Path) else one, factor) for one, factor in adapters)
 
 
-@dataclass(eq=False)
-class AdaptedPriors:
-    """A prior with different adapters at different times; the last `CACHE_SIZE` merged ones are cached."""
-
-    prior: Prior
-    cache: OrderedDict[tuple[Applied, ...], Prior] = field(default_factory=OrderedDict)
-
-    def of(self, adapters: tuple[Applied, ...]) -> Prior:
-        """The prior with these adapters besides those it has; errors as of `adapt`."""
-        if not adapters:
-            return self.prior
-        if adapters not in self.cache:
-            self.cache[adapters] = adapt(self.prior, adapters)
-            while len(self.cache) > CACHE_SIZE:
-                self.cache.popitem(last=False)
-        self.cache.move_to_end(adapters)
-        return self.cache[adapters]
+def adapted_priors(prior: Prior) -> Callable[[tuple[Applied, ...]], Prior]:
+    """From adapters to the prior with them besides those it has, errors as of `adapt`; the last `CACHE_SIZE` merged
+    ones are cached."""
+    merged = lru_cache(CACHE_SIZE)(partial(adapt, prior))
+    return lambda adapters: merged(adapters) if adapters else prior

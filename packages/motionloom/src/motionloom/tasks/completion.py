@@ -5,21 +5,25 @@ clean. Here what is known is a condition of the network, sampling ends clean, an
 the rest meets it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import quintic_decay
-from motionloom.diffusion import SOLVERS, Denoiser, guide, row_noise, row_seed, sample
+from motionloom.blending import quintic_decay, smoothstep
+from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
 from motionloom.diffusion.sampling import Snapshot
 from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT, Place, bone_lengths, with_bones
+from motionloom.features.positions import SMPL_LAYOUT, Layout, Place, with_bones
+from motionloom.kinematics.feet import envelope
+from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
-from motionloom.tasks.best import candidate_seeds, index_of_smallest, liveliness_ranks
+from motionloom.tasks.best import Rank, candidate_seeds, index_of_smallest, liveliness_ranks
+from motionloom.tasks.splice import person_at
 from motionloom.tasks.watching import View
 from motionloom.weights.predictor import Predictor
 
@@ -43,6 +47,16 @@ class Known:
     mask: NDArray[np.float32]
     """(frames, parts) 1 where a joint is known, see `Layout.part`; numbers between mix."""
 
+    def check(self, layout: Layout, rows: int) -> None:
+        """Raise MotionloomError for what is not of this layout, or of another number of rows."""
+        shape, mask = self.positions.shape, self.mask.shape
+        places = (*mask[:1], layout.joints, 3)
+        if mask[1:] != (layout.parts,) or shape not in (places, (rows, *places)):
+            raise MotionloomError(
+                f"what is known to this predictor are places (frames, {layout.joints}, 3) and a mask (frames, "
+                f"{layout.parts}); got {shape} and {mask}"
+            )
+
 
 def complete(
     predictor: Predictor,
@@ -64,70 +78,60 @@ def complete(
     can.
     """
     chosen = PredictionSampling.of(sampling, settings)
-    condition = predictor.condition(features, mask, pose)
+    windows = _Windows(predictor, predictor.condition(features, mask, pose), pose, chosen)
     way = chosen.levels(predictor.schedule)
     if chosen.best_of > 1:
-        seeds = _best_seeds(predictor, condition, pose, seeds=seeds, sampling=chosen, way=way)
-    state, walk = _start_sampling(predictor, condition, seeds, chosen, way)
+        seeds = windows.best_seeds(seeds, way[: len(way) // 2 + 1])
+    walk = windows.walk(seeds, way)
     if poses is not None:
         view = View(lambda states: poses(predictor.to_features(states, pose)))
-        walk = view.report_walk(walk, len(way) - 1, range(len(condition)))
-    for snapshot in walk:
-        state = snapshot.state
-    return join_known(predictor.to_features(state, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
+        walk = view.report_walk(walk, len(way) - 1, range(len(pose)))
+    [last] = deque(walk, maxlen=1)
+    return join_known(predictor.to_features(last.state, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
 
 
-def _start_sampling(
-    predictor: Predictor,
-    condition: np.ndarray,
-    seeds: Sequence[int],
-    sampling: PredictionSampling,
-    way: Sequence[int],
-) -> tuple[np.ndarray, Iterator[Snapshot]]:
-    """The noise that windows begin with, and the walk from there."""
-    noise = row_noise(seeds)
-    state = sampling.temperature * noise(np.empty((len(condition), *predictor.mean.shape), np.float32))
-    how = {"solver": SOLVERS[sampling.solver], "schedule": predictor.schedule, "noise": noise}
-    return state, sample(_guided_denoiser(predictor, condition, sampling.guidance), state, levels=way, **how)
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Windows of one condition each, and how they are sampled."""
 
+    predictor: Predictor
+    condition: np.ndarray
+    pose: np.ndarray
+    sampling: PredictionSampling
 
-def _guided_denoiser(predictor: Predictor, condition: np.ndarray, guidance: float) -> Denoiser:
-    yes, no = (np.full(len(condition), flag) for flag in (True, False))
+    def walk(self, seeds: Sequence[int], levels: Sequence[int]) -> Iterator[Snapshot]:
+        """From noise, one seed to a window, through the levels."""
+        noise, conditioned = row_noise(seeds), np.ones(len(seeds), np.bool_)
+        state = noise(np.empty((len(seeds), *self.predictor.mean.shape), np.float32))
 
-    def net(x: np.ndarray, level: int, cond: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        return predictor.denoiser(*cond)(x, level)
+        def net(x: np.ndarray, level: int, cond: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+            return self.predictor.denoiser(*cond)(x, level)
 
-    return guide(net, (condition, yes), (condition, no), guidance)
-
-
-def _best_seeds(
-    predictor: Predictor,
-    condition: np.ndarray,
-    pose: np.ndarray,
-    *,
-    seeds: Sequence[int],
-    sampling: PredictionSampling,
-    way: Sequence[int],
-) -> list[int]:
-    """For each window the best of several seeds: half way whole, moving, and then nearest to the mean of them all."""
-    count = sampling.best_of
-    tried = [candidate_seeds(seed, count) for seed in seeds]
-    several = [seed for one in tried for seed in one]
-    state, walk = _start_sampling(
-        predictor, condition.repeat(count, axis=0), several, sampling, way[: len(way) // 2 + 1]
-    )
-    for snapshot in walk:
-        state = snapshot.clean
-    features, layout = predictor.to_features(state, pose.repeat(count, axis=0)), predictor.layout
-    chosen = []
-    for own, candidates in zip(features.reshape(len(seeds), count, *features.shape[1:]), tried, strict=True):
-        away = ((own - own.mean(axis=0)) ** 2).mean(axis=(1, 2))
-        person = layout.names == SMPL_LAYOUT.names
-        before = liveliness_ranks(layout.decode(own, Place(np.zeros(3), np.zeros(())))) if person else [()] * count
-        chosen.append(
-            candidates[index_of_smallest([(*rank, float(far)) for rank, far in zip(before, away, strict=True)])]
+        return sample(
+            guide(net, (self.condition, conditioned), (self.condition, ~conditioned), self.sampling.guidance),
+            self.sampling.temperature * state,
+            levels=levels,
+            solver=SOLVERS[self.sampling.solver],
+            schedule=self.predictor.schedule,
+            noise=noise,
         )
-    return chosen
+
+    def best_seeds(self, seeds: Sequence[int], levels: Sequence[int]) -> list[int]:
+        """For each window the best of several: after these levels whole, moving, then nearest to the mean of all."""
+        count, layout = self.sampling.best_of, self.predictor.layout
+        condition, pose = (part.repeat(count, axis=0) for part in (self.condition, self.pose))
+        tried = [candidate_seeds(seed, count) for seed in seeds]
+        several = replace(self, condition=condition, pose=pose)
+        [last] = deque(several.walk([seed for one in tried for seed in one], levels), maxlen=1)
+        features = self.predictor.to_features(last.clean, pose)
+        chosen = []
+        for own, candidates in zip(features.reshape(len(seeds), count, *features.shape[1:]), tried, strict=True):
+            away = ((own - own.mean(axis=0)) ** 2).mean(axis=(1, 2)).tolist()
+            ranks: Sequence[Rank] = [()] * count
+            if layout.names == SMPL_LAYOUT.names:
+                ranks = liveliness_ranks(layout.decode(own, Place(np.zeros(3), np.zeros(()))))
+            chosen.append(candidates[index_of_smallest([(*rank, far) for rank, far in zip(ranks, away, strict=True)])])
+        return chosen
 
 
 def join_known(sampled: np.ndarray, known: np.ndarray, mask: np.ndarray, *, ease: int) -> np.ndarray:
@@ -191,22 +195,28 @@ def next_frames(
     h is 2 to ``predictor.observed``. ``frames``: how many, at most (and by default) as many as the window has left
     behind the frames it usually sees. ``exact``: bones as long as the past's; else what the network predicts.
     """
-    past = np.asarray(past, dtype=np.float64)
-    frames = predictor.frames - predictor.observed if frames is None else frames
-    _check(predictor, past, frames, known)
-    rows, h = past.shape[:2]
-    layout, place = predictor.layout, predictor.layout.place(past[:, -1])
-    observed = np.zeros((rows, predictor.frames, layout.channels))
-    mask = np.zeros((predictor.frames, layout.parts), dtype=np.float32)
-    observed[:, :h], mask[:h] = layout.encode(past, place), 1
-    if known is not None:
-        positions = np.broadcast_to(known.positions, (rows, *known.positions.shape[-3:]))
-        count = min(positions.shape[1], predictor.frames - h)
-        observed[:, h : h + count], mask[h : h + count] = (
-            layout.encode(positions[:, :count], place),
-            known.mask[:count],
+    past, layout = np.asarray(past, dtype=np.float64), predictor.layout
+    if past.ndim != 4 or not len(past) or past.shape[2:] != (layout.joints, 3) or not np.isfinite(past).all():
+        raise MotionloomError(
+            f"a past for this predictor is finite places (rows, frames, {layout.joints}, 3); got shape {past.shape}"
         )
-    features, masks = observed.astype(np.float32), np.broadcast_to(mask, (rows, *mask.shape))
+    frames = predictor.frames - predictor.observed if frames is None else frames
+    rows, h = past.shape[:2]
+    if not 2 <= h <= predictor.observed or not 1 <= frames <= predictor.frames - h:
+        raise MotionloomError(
+            f"this predictor sees 2 to {predictor.observed} frames and samples, with them, at most {predictor.frames}; "
+            f"got a past of {h} and {frames} frames to sample"
+        )
+    place = layout.place(past[:, -1])
+    features = np.zeros((rows, predictor.frames, layout.channels), np.float32)
+    mask = np.zeros((predictor.frames, layout.parts), np.float32)
+    features[:, :h], mask[:h] = layout.encode(past, place), 1
+    if known is not None:
+        known.check(layout, rows)
+        end = h + min(known.positions.shape[-3], predictor.frames - h)
+        positions = np.broadcast_to(known.positions, (rows, *known.positions.shape[-3:]))
+        features[:, h:end] = layout.encode(positions[:, : end - h], place)
+        mask[h:end] = known.mask[: end - h]
 
     def placed(windows: np.ndarray) -> Array:
         return layout.decode(windows[:, h : h + frames], place)
@@ -214,40 +224,13 @@ def next_frames(
     completed = complete(
         predictor,
         features,
-        masks,
+        np.broadcast_to(mask, (rows, *mask.shape)),
         features[:, h - 1],
         seeds=seeds,
         sampling=PredictionSampling.of(sampling, settings),
         poses=lambda windows: placed(windows)[:, None],
     )
-    places = placed(completed)
-    return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
-
-
-def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) -> None:
-    layout = predictor.layout
-    if past.ndim != 4 or not len(past) or past.shape[2:] != (layout.joints, 3) or not np.isfinite(past).all():
-        raise MotionloomError(
-            f"a past for this predictor is finite places (rows, frames, {layout.joints}, 3); got shape {past.shape}"
-        )
-    h = past.shape[1]
-    if not 2 <= h <= predictor.observed or not 1 <= frames <= predictor.frames - h:
-        raise MotionloomError(
-            f"this predictor sees 2 to {predictor.observed} frames and samples, with them, at most {predictor.frames}; "
-            f"got a past of {h} and {frames} frames to sample"
-        )
-    if known is None:
-        return
-    shape, mask = known.positions.shape, known.mask.shape
-    if (
-        mask[1:] != (layout.parts,)
-        or shape[-3:] != (*mask[:1], layout.joints, 3)
-        or shape[:-3] not in ((), (len(past),))
-    ):
-        raise MotionloomError(
-            f"what is known to this predictor are places (frames, {layout.joints}, 3) and a mask (frames, "
-            f"{layout.parts}); got {shape} and {mask}"
-        )
+    return with_bones(placed(completed), layout.parents, like=past) if exact else placed(completed)
 
 
 def futures(
@@ -284,3 +267,101 @@ def futures(
     ]
     sampled = np.concatenate(parts)
     return sampled.reshape(len(past), count, *sampled.shape[1:])
+
+
+# Window after window behind a past
+
+
+CONTEXT = 3.0
+"""Seconds of a clip that are looked at for where its floor is."""
+TEMPERATURE_AFTER_FIRST = 1.08
+"""How much livelier the windows behind the first begin: the network goes on from its own calm; docs/decisions/0015."""
+MOST_SUNK, RISE = 0.02, 0.2
+"""Metres under the floor that are left, and seconds in which people who would sink further are lifted."""
+KnownFrames = Callable[[int, int], Known | None]
+"""(first, last): what is known of the frames ``first`` to before ``last`` behind the past, 1 being the first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """The clip that futures go on from: retargeted to the uniform person once."""
+
+    predictor: Predictor
+    motion: Motion
+    tail: Motion
+    """Its last frames that lie within what the predictor sees, at least 2."""
+    person: Array
+    """(h, 22, 3) metres: the uniform person at the predictor's rate; the last frame is the clip's last frame."""
+    rate: float
+    """Frames of the predictor in one of the clip."""
+
+    @staticmethod
+    def of(predictor: Predictor, motion: Motion) -> "Past":
+        """Raises MotionloomError for a clip of less than two frames."""
+        if len(motion) < 2:
+            raise MotionloomError(f"the past has {len(motion)} frame; at least 2 are needed to see how it moves")
+        seconds = max(CONTEXT, predictor.observed / predictor.fps)
+        context = motion.frames(max(len(motion) - round(seconds * motion.fps) - 2, 0), len(motion))
+        whole = int((len(motion) - 1) / motion.fps * predictor.fps + 1e-6) + 1
+        back = np.arange(min(max(whole, 2), predictor.observed))[::-1] / predictor.fps * motion.fps
+        person = person_at(context, len(context) - 1 - back)
+        observed = max(int(back[0] + 1e-6) + 1, 2)
+        tail = motion.frames(max(len(motion) - observed, 0), len(motion))
+        return Past(predictor, motion, tail, person, predictor.fps / motion.fps)
+
+
+@dataclass(frozen=True)
+class WindowSampler:
+    """What samples windows, and how."""
+
+    predictor: Predictor
+    sampling: PredictionSampling
+    root: bool = True
+    """False: the person stays in place, but rises and sinks."""
+
+    def windows(
+        self, person: Array, seeds: Sequence[tuple[int, int]], known_frames: KnownFrames | None, count: int
+    ) -> Iterator[Array]:
+        """(rows, frames, 22, 3) one after the other behind ``person`` (rows, h, 22, 3)."""
+        frames = self.predictor.frames - self.predictor.observed
+        for number in range(count):
+            first = number * frames + 1
+            known = known_frames(first, first + self.predictor.frames - person.shape[1]) if known_frames else None
+            window = self.window(person, seeds, number, known, livelier=TEMPERATURE_AFTER_FIRST if number else 1.0)
+            yield window
+            person = np.concatenate([person, window], axis=1)[:, -self.predictor.observed :]
+
+    def window(
+        self,
+        person: Array,
+        seeds: Sequence[tuple[int, int]],
+        number: int,
+        known: Known | None,
+        *,
+        frames: int | None = None,
+        livelier: float = 1.0,
+    ) -> Array:
+        """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
+        positions = next_frames(
+            self.predictor,
+            person,
+            seeds=[row_seed(*seed, number) for seed in seeds],
+            known=known,
+            frames=frames,
+            sampling=replace(self.sampling, temperature=min(self.sampling.temperature * livelier, 2.0)),
+        )
+        lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -MOST_SUNK)  # who is lower already stays there
+        under = (lowest[:, None] - positions[..., 1].min(axis=-1)).clip(0)
+        ease = max(round(RISE * self.predictor.fps), 1)
+        lift = envelope(under, ease // 2) * _rising(positions.shape[1], 2 * ease)
+        positions = positions + lift[..., None, None] * [0, 1, 0]
+        return positions if self.root else positions + (person[:, -1:, :1] - positions[:, :, :1]) * [1, 0, 1]
+
+
+def _rising(frames: int, ease: int) -> Array:
+    return smoothstep(np.arange(1, frames + 1) / ease)
+
+
+def window_count(predictor: Predictor, seconds: float) -> int:
+    """How many windows it takes."""
+    return int(np.ceil(seconds * predictor.fps / (predictor.frames - predictor.observed) - 1e-6))

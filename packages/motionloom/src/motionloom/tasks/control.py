@@ -25,7 +25,7 @@ from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.sampling import Batch, Progress, Rows, sample
 from motionloom.tasks.text import check_goal_length, check_prompts, single_person_view, to_motion
-from motionloom.weights.adapter import Adapter, adapted, show
+from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
 
@@ -164,7 +164,7 @@ def blended(
     """DiffusionBlending: networks guided by themselves, then their weighted sum; conditioned where they can be."""
     null = cond.null()
     guided = [
-        guide(net, show(net, net.bind(cond), known, mask), show(net, net.bind(null), known, mask), guidance)
+        guide(net, net.show(net.bind(cond), known, mask), net.show(net.bind(null), known, mask), guidance)
         for net in nets
     ]
     return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)

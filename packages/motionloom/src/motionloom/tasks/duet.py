@@ -15,9 +15,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.diffusion import lerp
-from motionloom.edits.bodies import Bodies
-from motionloom.edits.meeting import Meeting
+from motionloom.edits.meeting import Bodies, Meeting
 from motionloom.edits.relative_pose import PoseGuidance, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
@@ -29,14 +27,14 @@ from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.requests.sampling import PairSampling, PairSettings
-from motionloom.runtime.pair import PLACE, PairSession, join, part, people
+from motionloom.runtime.pair import PLACE, PairSession, join, part
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.body import solve_stream
 from motionloom.tasks.long import (
     Row,
     Track,
     chain_rows,
-    group_by_net,
+    guided_estimates,
     place_pieces,
     segments_on,
     stack_conditions,
@@ -45,7 +43,6 @@ from motionloom.tasks.long import (
 from motionloom.tasks.pair import (
     PairEdits,
     check_pair,
-    check_person,
     meetings_of,
     pair_features,
     pair_seeds,
@@ -140,7 +137,8 @@ def compose_pair(
     (Shafir et al. 2024, sections 3 and 4, in one loop; nothing published does both.)
     """
     check_pair(prior)
-    check_person(person)
+    if person not in (0, 1):
+        raise MotionloomError(f"the two people are 0 and 1; there is no person {person}")
     chosen = PairSampling.of(sampling, settings).alone()
     chosen.levels(prior.schedule)
     if not segments:
@@ -319,17 +317,21 @@ class _PairDenoiser:
     def __call__(self, rows: Sequence[_PairRow], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
         parts = [_split_state(state) for state in states]
         shown = [
-            self._conditioning_pose(row, places, level) for row, (_, places), level in zip(rows, parts, at, strict=True)
+            join(self._conditioning_pose(row, places, level), motion)
+            for row, (motion, places), level in zip(rows, parts, at, strict=True)
         ]
-        frames = [motion.shape[1] for motion, _ in parts]
-        x = np.stack(
-            [join(places, zero_padded(motion, max(frames))) for places, (motion, _) in zip(shown, parts, strict=True)]
+        nets = {id(person): row.net for row in rows for person in row.people}
+        denoised = guided_estimates(
+            [person for row in rows for person in row.people],
+            [state for pair in shown for state in pair],
+            [level for level in at for _ in (0, 1)],
+            net=lambda person: nets[id(person)],
+            slots=1,
         )
-        denoised = self._estimates(rows, x, frames, at)
         estimates = []
-        for row, count, level, one, (state, _) in zip(rows, frames, at, denoised, parts, strict=True):
-            places, motion = part(one)
-            each = zip(motion[:, :count], row.people, strict=True)
+        for row, level, *pair, (state, _) in zip(rows, at, denoised[::2], denoised[1::2], parts, strict=True):
+            places, motion = part(np.stack(pair))
+            each = zip(motion, row.people, strict=True)
             motion = np.stack([person.correct(part_of, level) for part_of, person in each])
             begin = self._begin_poses_or_sampled(places, row, level)
             motion = self._with_pose_guidance(row, level, motion, begin, state=state)
@@ -388,31 +390,3 @@ class _PairDenoiser:
         if base is self.prior.net:
             return self.net
         return before.net if before and before.people[0].net is base else self.net.over(base)
-
-    def _estimates(
-        self, rows: Sequence[_PairRow], x: np.ndarray, frames: Sequence[int], at: Sequence[int]
-    ) -> list[np.ndarray]:
-        """Guided estimates (2, 1 + frames, numbers) of rows x (rows, 2, 1 + frames, numbers), one network call for each
-        set of adapters."""
-        denoised: dict[int, np.ndarray] = {}
-        for places in group_by_net([row.people[0] for row in rows]):
-            persons = [person for i in places for person in rows[i].people]
-            estimates = self._guided(
-                rows[places[0]].net,
-                persons,
-                x[places].reshape(-1, *x.shape[2:]),
-                [frames[i] for i in places],
-                [at[i] for i in places],
-            )
-            denoised.update(zip(places, people(estimates), strict=True))
-        return [denoised[i] for i in range(len(rows))]
-
-    def _guided(
-        self, net: PairSession, rows: Sequence[Row], x: np.ndarray, frames: Sequence[int], at: Sequence[int]
-    ) -> np.ndarray:
-        """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""
-        lengths, level = (np.tile(np.repeat(each, 2), 2) for each in (frames, at))
-        bound = stack_conditions([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
-        conditional, unconditional = np.split(net(np.concatenate([x, x]), level, bound), 2)
-        scale = np.array([row.guidance(one) for row, one in zip(rows, np.repeat(at, 2))], x.dtype)[:, None, None]
-        return lerp(unconditional, conditional, scale)

@@ -4,17 +4,19 @@ Everything that is kept comes back exactly, on the clip's own skeleton and at it
 sampled goes through the network, so that the time does not grow with the length of the clip.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.edits.boundary import InpaintWindow
+from motionloom.diffusion import Denoiser
+from motionloom.edits.boundary import InpaintWindow, arrival, joining
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.placed import PlacedMotion
 from motionloom.goals.heads import read_head
 from motionloom.motion import Motion
 from motionloom.requests.edit import Edit
@@ -34,8 +36,7 @@ from motionloom.tasks.direct_edits import (
     joints_of,
     kept_parts_of,
 )
-from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.sampling import Progress
+from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
 from motionloom.tasks.splice import (
     apply_sample,
     concatenate,
@@ -45,6 +46,7 @@ from motionloom.tasks.splice import (
     splice,
 )
 from motionloom.tasks.text import check_humanml
+from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
 WINDOW = 8.0
@@ -191,17 +193,6 @@ def edit(
     return versions
 
 
-def close(
-    prior: Prior, motion: Motion, text: str, *, blend: float, foot_lock: bool = True, **settings: Unpack[Settings]
-) -> Motion:
-    """The motion with its end sampled anew so that the beginning can follow it.
-
-    text: what the person does there. blend: seconds that are sampled. Raises MotionloomError where it is too short.
-    """
-    (closed,) = edit(prior, motion, text, Loop(blend), foot_lock=foot_lock, **settings)
-    return closed
-
-
 def changes_from_options(
     text: str,
     *,
@@ -300,7 +291,8 @@ def _inpaint_span(sampler: _Sampler, motion: Motion, span: tuple[int, int], chan
     stretch = _inpaint_window(window, first, last, keep=kept_feature_mask(change.keep), strength=change.strength)
     sampled = sampler.sample(window, replace(stretch, begin=begin / motion.fps), seed)
     spliced = splice(window, sampled, first, last=last, kept=kept_parts_of(motion, change.keep))
-    before, behind = (_frames_if_any(motion.frames, span) for span in ((0, start), (stop, len(motion))))
+    before = [motion.frames(0, start)] if start else []
+    behind = [motion.frames(stop, len(motion))] if stop < len(motion) else []
     return concatenate(*before, spliced.frames(first, last), *behind)
 
 
@@ -343,10 +335,6 @@ def _inpaint_window(
     return InpaintWindow(positions, at[0], stop, np.zeros(WIDTH, dtype=bool) if keep is None else keep, strength)
 
 
-def _frames_if_any(frames: Callable[[int, int], Motion], span: Span) -> list[Motion]:
-    return [frames(int(span[0]), int(span[1]))] if span[0] < span[1] else []
-
-
 # Errors of requests
 
 
@@ -360,3 +348,53 @@ def _check(prior: Prior, motion: Motion, changes: Sequence[Change]) -> None:
         )
     for change in changes:
         length = change.check(length, 1 / motion.fps)
+
+
+# What is sampled: a stretch of a person's motion between frames that are known, which stay (Lugmayr et al.,
+# "RePaint", CVPR 2022, without its repetitions). Where the motion goes on behind it, every denoised estimate is made
+# to arrive there: features hold velocities of the root, nothing else would.
+
+Array = NDArray[np.float64]
+
+
+def inpaint_motion(
+    prior: Prior, window: InpaintWindow, text: str, sampling: Sampling, *, seed: int, progress: Progress | None = None
+) -> PlacedMotion:
+    """A whole window with the frames ``first`` to before ``last`` sampled by the text; the others come back to float32.
+
+    An empty text asks for nothing in particular. Frames from 0 on are placed by the next ones.
+    """
+    whole = PlacedMotion.of(window.positions)
+    known = whole.features[None]
+    mask = np.ones(known.shape, np.bool_)
+    mask[:, window.first : window.last] = window.keep
+    spread = prior.spread
+    meet, reach = joining(known, mask, window.first, window.last), arrival(known, mask, window)
+
+    def bent(denoise: Denoiser, _: Batch) -> Denoiser:
+        return lambda state, level: (reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean) / spread
+
+    def poses(states: np.ndarray) -> Array:
+        return _placed(states[0] * spread + prior.mean, whole, window).positions[None, None]
+
+    observed = Observed((known - prior.mean) / spread, mask, strength=window.strength)
+    rows = Rows([text], [known.shape[1]], [seed])
+    [(_, state)] = sample(
+        prior,
+        rows,
+        sampling,
+        edits=[bent],
+        observed=observed,
+        corrected=True,
+        progress=progress,
+        view=View(poses, begin=window.begin),
+    )
+    return _placed(state * spread + prior.mean, whole, window)
+
+
+def _placed(features: np.ndarray, whole: PlacedMotion, window: InpaintWindow) -> PlacedMotion:
+    """A sampled window in the world, where the frames before the stretch are, or else those behind it."""
+    placed = PlacedMotion(features, whole.begin)
+    if window.first == 0 and window.last < len(features):
+        return placed.moved_to(whole.at(window.last), window.last)
+    return placed

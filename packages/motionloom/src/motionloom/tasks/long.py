@@ -11,7 +11,6 @@ The published procedure and that of the paper are in `lab.papers.double_take`; d
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import islice
 from typing import Unpack
 
@@ -32,9 +31,9 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
-from motionloom.tasks.adapting import AdaptedPriors, load_adapters
+from motionloom.tasks.adapting import adapted_priors, load_adapters
 from motionloom.tasks.body import Places, solve_stream
-from motionloom.tasks.sampling import Moves, sample_chain
+from motionloom.tasks.sampling import Moves, Network, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
 from motionloom.tasks.text import check_humanml
 from motionloom.tasks.watching import ChainView
@@ -183,7 +182,7 @@ def long_features(
     segments then. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
     """
     chosen = Sampling.of(sampling, settings)
-    denoise = partial(_denoise_rows, prior, chosen.levels(prior.schedule)[-2])
+    last = chosen.levels(prior.schedule)[-2]
     rows, each = chain_rows(prior, segments, chosen, past), None
     if chosen.number() > 1:
         own = list(rows)
@@ -192,6 +191,10 @@ def long_features(
 
     def features(row: Row, state: np.ndarray, _: int = 0) -> np.ndarray:
         return row.between(state) * prior.std + prior.mean
+
+    def denoise(rows: Sequence[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
+        denoised = _shift_averaged(prior, rows, states, at, last=last)
+        return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
     def poses(pieces: list[np.ndarray]) -> Array:
         return PlacedMotion(np.concatenate(pieces), place).positions[None]
@@ -210,19 +213,11 @@ def long_features(
         yield features(row, state)
 
 
-def _denoise_rows(
-    prior: Prior, last: int, rows: Sequence[Row], states: Sequence[np.ndarray], at: Sequence[int]
-) -> list[np.ndarray]:
-    """Denoised states of rows, each through what corrects it."""
-    denoised = _shift_averaged(prior, list(rows), states, at, last=last)
-    return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
-
-
 def chain_rows(prior: Prior, segments: Iterable[Segment], sampling: Sampling, past: "Past | None") -> Iterator[Row]:
     """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
     before, number = len(past.known) if past else 0, 0
     lead, trail, behind = (past.lead, past.trail, past.behind) if past else (0, 0, None)
-    priors = AdaptedPriors(prior)
+    adapted = adapted_priors(prior)
     iterator = iter(segments)
     segment = next(iterator, None)
     while segment is not None:
@@ -237,9 +232,9 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], sampling: Sampling, pa
             )
         after = overlap // 2 if following or behind is None else len(behind)
         length = before + frames + after
-        own = priors.of(segment.adapters)
+        own = adapted(segment.adapters)
         bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
-        edits = [past.start_correction(prior, length)] if past and not number and len(past.known) else []
+        edits = [holding_correction(past.known, prior, length)] if past and not number and len(past.known) else []
         if behind is not None and not following:
             edits.append(holding_correction(behind, prior, length, last=True))
         if segment.goal and not segment.goal.empty:
@@ -268,14 +263,14 @@ def _chain_corrections(edits: Sequence[Correction]) -> Correction:
 
 
 def _shift_averaged(
-    prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int], *, last: int
+    prior: Prior, rows: Sequence[Row], states: Sequence[np.ndarray], at: Sequence[int], *, last: int
 ) -> list[np.ndarray]:
     """Estimates; those of the last move are averages over all ways to divide the frames into the network's tokens.
 
     A token holds several frames, and between tokens the network leaves small steps. (Averaging over shifts is the
     cycle spinning of Coifman & Donoho 1995; `smooth` is the cheaper remedy of single motions.)
     """
-    cleans = _estimates(prior, rows, states, at)
+    cleans = guided_estimates(rows, states, at)
     ending = [i for i, level in enumerate(at) if level == last]
     shifts = range(1, prior.net.config.patch)
     sums = {i: cleans[i].copy() for i in ending}
@@ -283,9 +278,8 @@ def _shift_averaged(
         longer = [i for i in ending if len(states[i]) > shift]
         if not longer:
             break
-        shifted = _estimates(
-            prior, [rows[i] for i in longer], [states[i][shift:] for i in longer], [last] * len(longer)
-        )
+        some = [rows[i] for i in longer]
+        shifted = guided_estimates(some, [states[i][shift:] for i in longer], [last] * len(longer))
         for i, clean in zip(longer, shifted, strict=True):
             sums[i][shift:] += clean
     for i, total in sums.items():
@@ -294,49 +288,42 @@ def _shift_averaged(
     return cleans
 
 
-def _estimates(prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
-    """Guided estimates of rows of different lengths and levels, as one network call for each set of adapters."""
-    cleans: dict[int, np.ndarray] = {}
-    for numbers in group_by_net(rows):
-        some = [rows[i] for i in numbers]
-        estimates = _estimates_of_one_net(some, [states[i] for i in numbers], [at[i] for i in numbers])
-        cleans.update(zip(numbers, estimates, strict=True))
-    return [cleans[i] for i in range(len(rows))]
+def guided_estimates(
+    rows: Sequence[Row],
+    states: Sequence[np.ndarray],
+    at: Sequence[int],
+    *,
+    net: Callable[[Row], Network] = lambda row: row.net,
+    slots: int = 0,
+) -> list[np.ndarray]:
+    """Estimates of rows of different lengths and levels, as one network call for each set of adapters.
 
-
-def group_by_net(rows: Sequence[Row]) -> list[list[int]]:
-    """Numbers of rows whose segments have the same network, group by group."""
+    net: of a row. slots: tokens before the frames of a state.
+    """
+    estimates: dict[int, np.ndarray] = {}
     groups: dict[int, list[int]] = {}
     for number, row in enumerate(rows):
         groups.setdefault(id(row.net), []).append(number)
-    return list(groups.values())
-
-
-def _estimates_of_one_net(rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
-    frames = [len(state) for state in states]
-    x = np.stack([zero_padded(state, max(frames)) for state in states])
-    bound = stack_conditions([row.cond for row in rows] + [row.null for row in rows])
-    bound = bound._replace(lengths=np.array([*frames, *frames]))
-    answer = rows[0].net(np.concatenate([x, x]), np.array([*at, *at]), bound)
-    conditional, unconditional = np.split(answer, 2)
-    scale = np.array([row.guidance(level) for row, level in zip(rows, at)], x.dtype)[:, None, None]
-    guided = lerp(unconditional, conditional, scale)
-    return [clean[:count] for clean, count in zip(guided, frames, strict=True)]
+    for numbers in groups.values():
+        some, tokens = [rows[i] for i in numbers], [len(states[i]) for i in numbers]
+        x = np.stack([zero_padded(states[i], max(tokens)) for i in numbers])
+        bound = stack_conditions([row.cond for row in some] + [row.null for row in some])
+        bound = bound._replace(lengths=np.array([*tokens, *tokens]) - slots)
+        levels = [at[i] for i in numbers]
+        conditional, unconditional = np.split(net(some[0])(np.concatenate([x, x]), np.array(2 * levels), bound), 2)
+        scale = np.array([row.guidance(level) for row, level in zip(some, levels, strict=True)], x.dtype)[:, None, None]
+        guided = lerp(unconditional, conditional, scale)
+        estimates.update((i, one[:count]) for i, one, count in zip(numbers, guided, tokens, strict=True))
+    return [estimates[i] for i in range(len(rows))]
 
 
 def stack_conditions(bounds: list[Bound]) -> Bound:
     """Rows of several conditions, their words padded to the longest."""
-    most = max(one.words.shape[-1] for one in bounds)
-
-    return Bound(
-        np.concatenate([one.text for one in bounds]),
-        np.concatenate([zero_padded(one.keys, most) for one in bounds]),
-        np.concatenate([zero_padded(one.values, most) for one in bounds]),
-        np.concatenate([zero_padded(one.words, most, axis=-1) for one in bounds]),
-        np.concatenate([one.lengths for one in bounds]),
-        np.concatenate([one.flags for one in bounds]),
-        np.concatenate([one.shown for one in bounds]),
-    )
+    most, padded = max(one.words.shape[-1] for one in bounds), []
+    for one in bounds:
+        keys, values = zero_padded(one.keys, most), zero_padded(one.values, most)
+        padded.append(one._replace(keys=keys, values=values, words=zero_padded(one.words, most, axis=-1)))
+    return Bound._make(map(np.concatenate, zip(*padded, strict=True)))
 
 
 def zero_padded(array: np.ndarray, length: int, *, axis: int = -2) -> np.ndarray:
@@ -369,10 +356,6 @@ class Past:
         """Of anybody's motion, as of `last_frames`."""
         placed = last_frames(motion)
         return Past(placed.features, placed.end)
-
-    def start_correction(self, prior: Prior, length: int) -> Correction:
-        """Makes the first frames of a row's estimate the known ones, and the next ones leave them without a jump."""
-        return holding_correction(self.known, prior, length)
 
 
 def last_frames(motion: Motion) -> PlacedMotion:

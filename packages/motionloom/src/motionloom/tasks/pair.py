@@ -12,9 +12,8 @@ from typing import Unpack
 import numpy as np
 
 from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
-from motionloom.edits.bodies import Bodies
 from motionloom.edits.fitting import fit
-from motionloom.edits.meeting import Meeting, met
+from motionloom.edits.meeting import Bodies, Meeting, met
 from motionloom.edits.relative_pose import relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
 from motionloom.errors import MotionloomError
@@ -27,7 +26,7 @@ from motionloom.ground import GroundPose
 from motionloom.requests.sampling import PairSampling, PairSettings, Seed
 from motionloom.requests.shared import LONGEST
 from motionloom.runtime.pair import PairSession, people
-from motionloom.tasks.long import Past
+from motionloom.tasks.long import holding_correction
 from motionloom.tasks.people import Duet, PairPast, finish_person, known_state
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
 from motionloom.tasks.text import check_goal_length, check_humanml, frames_in
@@ -254,13 +253,6 @@ def check_pair(prior: Prior, *, count: int = 1, seconds: float = 0.0) -> None:
         )
 
 
-def check_person(person: int) -> int:
-    """0 or 1; raises MotionloomError for anybody else."""
-    if person not in (0, 1):
-        raise MotionloomError(f"the two people are 0 and 1; there is no person {person}")
-    return person
-
-
 # Going on
 
 
@@ -296,7 +288,7 @@ def complete_pair(
     pasts, added = PairPast.of(past), max(round(seconds * past[0].fps), 1)
     frames = pasts.known.features.shape[-2] + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
     net, count = block.net(prior), chosen.number()
-    leaving = [Past(one, GroundPose()).start_correction(prior, frames) for one in pasts.known.features]
+    leaving = [holding_correction(one, prior, frames) for one in pasts.known.features]
     edits = PairEdits(
         known_state(net, PairMotion.stack([pasts.known] * count), frames),
         leaving * count,

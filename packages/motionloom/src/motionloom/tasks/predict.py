@@ -5,8 +5,8 @@ put behind the clip, which stays bit for bit (`tasks.splice`). Some parts can be
 can be made to arrive at one.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Literal, Unpack
 
@@ -14,19 +14,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.goals.hold import FixedJoints, FixedPart
+from motionloom.goals.mask_file import fixes_everything
+from motionloom.goals.schemas import MASK_JOINTS
 from motionloom.motion import Motion
 from motionloom.requests.predict import DAY
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.completion import FUTURES, Known
-from motionloom.tasks.held_parts import HeldParts, check_like, prepare_hold
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.completion import CONTEXT, FUTURES, Known, Past, WindowSampler, window_count
 from motionloom.tasks.sampling import Progress
-from motionloom.tasks.splice import apply_positions, concatenate, continue_motion, ground_pose_at, move_on_floor, splice
-from motionloom.tasks.windows import CONTEXT, Past, WindowSampler, window_count
+from motionloom.tasks.splice import (
+    apply_positions,
+    concatenate,
+    continue_motion,
+    ground_pose_at,
+    kept_parts,
+    move_on_floor,
+    overlay,
+    splice,
+)
 from motionloom.weights.predictor import Predictor
 
 __all__ = ["FixedJoints", "FixedPart", "predict", "predict_pieces", "switch"]
@@ -79,7 +90,7 @@ def predict(
     _check(predictor, past.fps, seconds, count=count, sampling=chosen, longest=WHOLE)
     history = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
-    parts = prepare_hold(predictor, history, hold, seconds) if hold else None
+    parts = prepare_hold(history, hold, seconds) if hold else None
     [seed], count_of = replace(chosen, first=0).seeds(1), window_count(predictor, total / past.fps)
     sampler = WindowSampler(predictor, chosen, root)
     person = np.broadcast_to(history.person, (count, *history.person.shape))
@@ -119,7 +130,7 @@ def predict_pieces(
     _check(predictor, past.fps, seconds, count=1, sampling=chosen, longest=DAY)
     history = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
-    parts = prepare_hold(predictor, history, hold, seconds) if hold else None
+    parts = prepare_hold(history, hold, seconds) if hold else None
     windows = WindowSampler(predictor, chosen, root).windows(
         history.person[None],
         [(chosen.seeds(1)[0], number)],
@@ -216,12 +227,12 @@ def _arrive(
 
 
 def _continue_past(
-    past: Past, windows: Iterable[Array], total: int, *, hold: HeldParts | None, foot_lock: bool
+    past: Past, windows: Iterable[Array], total: int, *, hold: "HeldParts | None", foot_lock: bool
 ) -> Iterator[Motion]:
     """``total`` frames behind the past, in pieces of about `CHUNK` seconds; ``windows`` (frames, 22, 3) are read as
     needed."""
     fps, rate, tail, grid = past.motion.fps, past.rate, past.tail, past.person
-    tail_length, longest_grid, done = len(tail), 2 * past.observed, 0
+    tail_length, longest_grid, done = len(tail), 2 * past.predictor.observed, 0
     zero = len(grid) - 1  # the grid's index of the past's last frame
     for places in windows:
         grid = np.concatenate([grid, places])
@@ -263,3 +274,151 @@ def _check(
             f"{count} futures of {seconds:g} s are too much at once; ask for at most {MOST:g} s together"
         )
     sampling.levels(predictor.schedule)
+
+
+# Parts that are held to another motion
+
+
+RAMP = 0.2
+"""Seconds over which a part that is held for a while fades in and out."""
+NEAR = (0.3, np.radians(20))
+"""Metres and radians within which a source already goes on from the clip and is not moved there."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldParts:
+    """A `FixedJoints`, ready: on the grid of the predictor for the network, on the past's skeleton for the result."""
+
+    places: Array
+    """(frames, 22, 3) the source as the uniform person at the predictor's rate, from the first frame to predict."""
+    mask: NDArray[np.float32]
+    """(frames, 22)"""
+    source: Motion
+    joints: Array
+    """(frames, joints of the skeleton) weights."""
+    way: Array
+    """(frames,) weight of the place."""
+
+    def known(self, first: int, last: int) -> Known | None:
+        """What the network knows of the frames ``first`` to before ``last`` behind the past (1 is the first)."""
+        frames = slice(first - 1, min(last - 1, len(self.places)))
+        if first - 1 >= len(self.places) or not self.mask[frames].any():
+            return None
+        return Known(self.places[frames], self.mask[frames])
+
+    def overlay_on(self, new: Motion, done: int) -> Motion:
+        """A piece that begins ``done`` frames behind the past, with the held parts there."""
+        count = min(len(new), len(self.source) - done)
+        if count <= 0:
+            return new
+        here = slice(done, done + count)
+        held = overlay(new.frames(0, count), self.source.frames(done, done + count), self.joints[here], self.way[here])
+        return concatenate(held, new.frames(count, len(new))) if count < len(new) else held
+
+
+def prepare_hold(history: Past, hold: FixedJoints, seconds: float) -> HeldParts:
+    """The held parts for a past and a horizon; raises MotionloomError for parts that cannot be held."""
+    past, predictor = history.motion, history.predictor
+    check_like(past, hold.source, "motion that parts are held to")
+    _check_parts(hold, seconds)
+    rate, total = history.rate, max(round(seconds * past.fps), 1)
+    source = _moved_to_past(past, hold.source) if hold.align else hold.source
+    source = source.frames(0, total + int(np.ceil(predictor.frames / rate)))  # the last window looks further
+    end = len(source) / past.fps
+    tail = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
+    together = to_smpl22(concatenate(tail, source)).positions()
+    together = together + (history.person[-1, 0] - together[len(tail) - 1, 0])
+    count = int(len(source) * rate + 1e-6)
+    places = positions_at(together, len(tail) - 1 + np.arange(1, count + 1) / rate)
+    source = concatenate(source, *[source.frames(len(source) - 1, len(source))] * round(RAMP * past.fps))
+    mask = np.zeros((count, predictor.layout.parts), dtype=np.float32)
+    joints, way = np.zeros((len(source), len(past.skeleton))), np.zeros(len(source))
+    for part in hold.parts:
+        chosen = set(SMPL22.resolve(name for name in part.joints if name != "root"))
+        root = "root" in part.joints or 0 in chosen
+        spans = [(begin, min(until, end)) for begin, until in part.spans if begin < end]
+        inside = _weights(spans, np.arange(1, count + 1) / predictor.fps, 0.0) >= 1
+        for joint in chosen | ({0} if root else set()):
+            mask[inside, predictor.layout.part(joint)] = 1
+        weight = _weights(spans, np.arange(1, len(source) + 1) / past.fps, RAMP)
+        flags = _joint_flags(past, chosen)
+        joints = np.maximum(joints, weight[:, None] * flags)
+        way = np.maximum(way, weight * root)
+    return HeldParts(places, mask, source, joints, way)
+
+
+def _joint_flags(past: Motion, chosen: frozenset[int] | set[int]) -> Array:
+    """(joints,) 1 for the past's joints that correspond to some of the 22, and for what hangs on them."""
+    always = kept_parts(past.skeleton).joints
+    flags = kept_parts(past.skeleton, frozenset(chosen)).joints & ~always
+    for joint, parent in enumerate(past.skeleton.parents):
+        flags[joint] |= always[joint] and parent >= 0 and flags[parent]
+    return flags.astype(np.float64)
+
+
+def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) -> Array:
+    """1 within spans of seconds, falling to 0 within ``ramp`` seconds around them."""
+    weight = np.zeros(len(times))
+    for begin, end in spans:
+        outside = (np.maximum(begin - times, times - end) - 1e-6).clip(0)
+        weight = np.maximum(weight, smoothstep(1 - outside / ramp) if ramp else outside == 0)
+    return weight
+
+
+def _moved_to_past(past: Motion, source: Motion) -> Motion:
+    """The source where the past ends, if it is not there."""
+    end, begin, before = (
+        ground_pose_at(past, len(past) - 1),
+        ground_pose_at(source, 0),
+        ground_pose_at(past, max(len(past) - 2, 0)),
+    )
+    metres, radians = end.apart(begin)
+    if radians < NEAR[1] and metres < NEAR[0]:
+        return source
+    return move_on_floor(source, begin, replace(end, x=2 * end.x - before.x, z=2 * end.z - before.z))
+
+
+def check_like(past: Motion, other: Motion, what: str) -> None:
+    """Raise MotionloomError unless both are of one skeleton and rate, and both with or without moving bones."""
+    if other.skeleton != past.skeleton:
+        raise MotionloomError(
+            f"the {what} has another skeleton ({len(other.skeleton)} joints, the past {len(past.skeleton)}); "
+            "retarget it to the past's first"
+        )
+    if (other.translations is None) != (past.translations is None):
+        raise MotionloomError(
+            f"the {what} and the past must both have bones of constant length, or both have moving ones"
+        )
+    if abs(other.fps - past.fps) > 1e-3 * past.fps:
+        raise MotionloomError(f"the {what} has {other.fps:g} fps and the past {past.fps:g}; resample it first")
+
+
+def _check_parts(hold: FixedJoints, seconds: float) -> None:
+    names = [name for part in hold.parts for name in part.joints]
+    unknown = [name for name in names if name not in MASK_JOINTS]
+    if unknown:
+        raise MotionloomError(f"no part called {unknown[0]!r} to hold; the parts are {', '.join(MASK_JOINTS)}")
+    if not names or not any(part.spans for part in hold.parts):
+        raise MotionloomError(f"nothing to hold: no joint is named; the parts are {', '.join(MASK_JOINTS)}")
+    for begin, end in (span for part in hold.parts for span in part.spans):
+        _check_span(begin, end, hold.source, seconds)
+    if fixes_everything(hold.parts, seconds):
+        raise MotionloomError("nothing to predict: all joints are held; hold fewer")
+
+
+def _check_span(begin: float, end: float, source: Motion, seconds: float) -> None:
+    long = len(source) / source.fps
+    if not 0 <= begin < end:
+        raise MotionloomError(
+            f"no stretch from {begin:g} to {end:g} s to hold; give a start of 0 or more below the end"
+        )
+    if begin >= min(seconds, long):
+        raise MotionloomError(
+            f"nothing to hold from {begin:g} s on: {seconds:g} s are predicted, and the motion that parts are held "
+            f"to is {long:g} s long"
+        )
+    if np.isfinite(end) and min(end, seconds) > long + 0.5 / source.fps:
+        raise MotionloomError(
+            f"parts are held until {end:g} s and the motion they come from is {long:g} s long; hold them for less or "
+            "give a longer one"
+        )

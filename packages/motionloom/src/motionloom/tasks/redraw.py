@@ -276,14 +276,11 @@ def _solve_body(timed: Timed, places: Places, first: int, end: int) -> Motion:
         for _ in range(2):  # what lies before, and then, backwards in time, what lies behind
             rest = [motion.frames(end, len(motion))] if end < len(motion) else []
             cleaned = clean_feet(motion.frames(0, end), contacts=places.contacts[:end], shown=first)
-            motion = _time_reversed(concatenate(cleaned, *rest))
+            motion = concatenate(cleaned, *rest)
+            motion = replace(motion, root=motion.root[::-1].copy(), rotations=motion.rotations[::-1].copy())
             places = Places(places.positions[::-1], places.contacts[::-1], places.goal)
             first, end = len(motion) - end, len(motion)
     return motion if places.goal.empty else fit(motion, places.goal)
-
-
-def _time_reversed(motion: Motion) -> Motion:
-    return replace(motion, root=motion.root[::-1].copy(), rotations=motion.rotations[::-1].copy())
 
 
 def _known_places(motion: Motion, known: np.ndarray | None) -> Places:

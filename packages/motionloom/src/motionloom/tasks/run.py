@@ -7,7 +7,7 @@ one is interrupted.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import control, duet, edit, long, pair, predict, redraw, text, worded
-from motionloom.tasks.adapting import AdaptedPriors, adapt
+from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import watching
@@ -52,11 +52,11 @@ class Models:
         """The same with more adapters of the prior; errors as of `adapt`."""
         if not adapters:
             return self
-        return Models(self._others.of(adapters), self.pair_weights, self.predictor_weights, self.device)
+        return Models(self._others(adapters), self.pair_weights, self.predictor_weights, self.device)
 
     @cached_property
-    def _others(self) -> AdaptedPriors:
-        return AdaptedPriors(self.prior)
+    def _others(self) -> Callable[[tuple[Applied, ...]], Prior]:
+        return adapted_priors(self.prior)
 
     @cached_property
     def block(self) -> PairBlock:
@@ -140,7 +140,7 @@ def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) 
     for begin in range(0, plan.count, size):
         some = min(size, plan.count - begin)
         group = replace(plan, sampling=replace(plan.sampling, first=first + begin, count=some))
-        moved = _GroupProgress(progress, begin, some, plan.count)
+        moved = partial(_report_group, progress, begin, some, plan.count)
         for number, result in enumerate(task(group, models, moved), start=first + begin):
             seed = plan.sampling.seed + (0 if own else number)
             yield close_loop(plan, models, replace(result, number=number, seed=seed))
@@ -165,17 +165,9 @@ def is_batched(plan: Any) -> bool:
     return plan.task != "duet" and plan.timeline is not None and not plan.timeline.readings
 
 
-@dataclass(frozen=True)
-class _GroupProgress:
-    """Reports how far the whole is by how far a group is."""
-
-    progress: Progress
-    begin: int
-    some: int
-    count: int
-
-    def __call__(self, done: int, of: int) -> None:
-        self.progress(self.begin * of + self.some * done, self.count * of)
+def _report_group(progress: Progress, begin: int, some: int, count: int, done: int, of: int) -> None:
+    """Report how far the whole is by how far a group is."""
+    progress(begin * of + some * done, count * of)
 
 
 def close_loop(plan: Any, models: Models, result: Result) -> Result:
@@ -187,10 +179,11 @@ def close_loop(plan: Any, models: Models, result: Result) -> Result:
     prompt = "" if plan.task == "duet" else prompt
     settings: dict[str, Any] = {"guidance": plan.sampling.guidance} if prompt else {}
     settings |= {} if plan.task in ("predict", "switch") else {"steps": plan.sampling.steps}
-    how = {"blend": values.blend, "foot_lock": values.foot_lock, "seed": plan.sampling.seed + result.number}
+    settings |= {"foot_lock": values.foot_lock, "seed": plan.sampling.seed + result.number}
+    loop = edit.Loop(values.blend)
     with watching(lambda denoised: None):  # what is watched are the motions
-        people = tuple(edit.close(models.prior, one, prompt, **how, **settings) for one in result.people)
-    return replace(result, people=people)
+        closed = [edit.edit(models.prior, one, prompt, loop, **settings) for one in result.people]
+    return replace(result, people=tuple(motion for [motion] in closed))
 
 
 def chain_progress(progress: Progress, steps: int, rows: int) -> Moves:
@@ -250,7 +243,11 @@ def _run_rows(plans: Sequence[Plan], models: Models, progress: Progress) -> Iter
         assert goal is not None
         own: dict[str, Any] = {"adapters": first.adapters, "fit": first.values.fit}
         own["foot_lock"] = first.values.foot_lock
-        results = map(_control_result, control.control_each(prior, prompts, goal, **own, **how))
+        controlled = control.control_each(prior, prompts, goal, **own, **how)
+        results = (
+            Result((one.motion,), measures={"missed": list(one.missed)}, remarks=list(one.missed), about=one)
+            for one in controlled
+        )
     elif first.timeline is not None:
         timelines = [plans[i].timeline or first.timeline for i, _ in rows]
         results = map(
@@ -269,11 +266,6 @@ def _worded_result(one: worded.Worded) -> Result:
     return Result((one.motion,), measures={"amounts": amounts}, remarks=one.shortfalls, about=one)
 
 
-def _control_result(one: control.Controlled) -> Result:
-    missed = list(one.missed)
-    return Result((one.motion,), measures={"missed": missed}, remarks=missed, about=one)
-
-
 def _edit(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     values, people = plan.values, list(plan.people)
     names = ("keep", "between", "loop", "blend", "extend", "strength", "smooth")
@@ -289,30 +281,14 @@ def _edit(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
 
 
 def _predict(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
-    futures = predict.predict(
-        models.predictor,
-        plan.people[0],
-        seconds=plan.values.seconds,
-        hold=plan.hold,
-        root=plan.values.root,
-        foot_lock=plan.values.foot_lock,
-        sampling=plan.sampling,
-        progress=progress,
-    )
-    return [Result((motion,)) for motion in futures]
-
-
-def _switch(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
-    assert plan.target is not None
-    motions = predict.switch(
-        models.predictor,
-        plan.people[0],
-        plan.target,
-        seconds=plan.values.seconds,
-        facing=plan.values.facing,
-        foot_lock=plan.values.foot_lock,
-        sampling=plan.sampling,
-    )
+    values, past = plan.values, plan.people[0]
+    how = {"seconds": values.seconds, "foot_lock": values.foot_lock, "sampling": plan.sampling}
+    if plan.task == "switch":
+        assert plan.target is not None
+        motions = predict.switch(models.predictor, past, plan.target, facing=values.facing, **how)
+    else:
+        own: dict[str, Any] = {"hold": plan.hold, "root": values.root, "progress": progress}
+        motions = predict.predict(models.predictor, past, **own, **how)
     return [Result((motion,)) for motion in motions]
 
 
@@ -347,7 +323,7 @@ _TASKS: dict[str, tuple[_Task, int]] = {
     "control": (_run_one, BATCH),
     "edit": (_edit, 1),
     "predict": (_predict, 16),
-    "switch": (_switch, 16),
+    "switch": (_predict, 16),
     "duet": (_duet, pair.PAIRS),
 }
 """The function of each task, and how many motions it samples together."""

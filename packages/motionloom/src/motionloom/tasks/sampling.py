@@ -63,6 +63,11 @@ class Rows:
             by_length.setdefault(-(-length // self.patch), []).append(row)
         return [rows[i : i + size] for rows in by_length.values() for i in range(0, len(rows), size)]
 
+    def of(self, rows: Sequence[int]) -> "Rows":
+        """Some of them."""
+        prompts, lengths, seeds = ([part[i] for i in rows] for part in (self.prompts, self.lengths, self.seeds))
+        return replace(self, prompts=prompts, lengths=lengths, seeds=seeds)
+
 
 @dataclass(frozen=True, eq=False)
 class Batch:
@@ -137,10 +142,11 @@ def sample(
     if halfway:
         way = way[: len(way) // 2 + 1]
     for numbers in batches:
-        lengths = [rows.lengths[i] for i in numbers]
+        some = rows.of(numbers)
+        lengths = list(some.lengths)
         padded = lengths if len(set(lengths)) > 1 else None
-        cond = prior.condition([rows.prompts[i] for i in numbers], padded)
-        batch = Batch(numbers, cond, [rows.seeds[i] for i in numbers])
+        batch = Batch(numbers, prior.condition(list(some.prompts), padded), list(some.seeds))
+        cond = batch.cond
         noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
         base = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.strength(prior.schedule))
         denoise, constrain = _identity_when_clean(base), None
@@ -204,12 +210,9 @@ def with_best_seeds(
     of = [row for first in motions for _ in range(count) for row in range(first, first + people)]
     seeds_of_rows = [candidate_seeds(seed, count) for seed in rows.seeds]
     seeds = [seeds_of_rows[row][place // people % count] for place, row in enumerate(of)]
-    several = replace(
-        rows, prompts=[rows.prompts[row] for row in of], lengths=[rows.lengths[row] for row in of], seeds=seeds
-    )
     candidates = sample(
         prior,
-        several,
+        replace(rows.of(of), seeds=seeds),
         sampling,
         network=network,
         edits=[_edit_of_candidates(edit, of) for edit in edits],
@@ -223,9 +226,7 @@ def with_best_seeds(
         own = range(first, first + people)
         states = np.stack([estimates[first * count + place] for place in range(count * people)])
         states = states.reshape(count, people, *states.shape[1:])[:, :, rows.slots :]
-        number = best_candidate(
-            prior, [rows.prompts[row] for row in own], states, seeds=seeds_of_rows[first], level=level
-        )
+        number = best_candidate(prior, rows.of(own).prompts, states, seeds=seeds_of_rows[first], level=level)
         chosen[first : first + people] = [seeds_of_rows[row][number] for row in own]
     return replace(rows, seeds=chosen)
 

@@ -17,7 +17,7 @@ from motionloom.diffusion.sampling import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as goal_timeline
-from motionloom.goals.amount_goal import is_met, measured
+from motionloom.goals.amounts import is_met, measured
 from motionloom.goals.remarks import numbers_read, parts_read, remarks_on
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb

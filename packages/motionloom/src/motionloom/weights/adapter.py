@@ -16,11 +16,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.prior_condition import Bound, Floats
 from motionloom.runtime.sizes import NetConfig
 from motionloom.weights.container import ADAPTERS, check, halved
 
@@ -175,7 +173,7 @@ def merged(net: PriorSession, adapters: Sequence[tuple[Adapter, float]]) -> Prio
 
 def adapted(net: PriorSession, adapter: Adapter) -> PriorSession:
     """The network with the adapter merged into its weights, as quick as the network itself; it may be shown what is
-    given (`show`)."""
+    given (`PriorSession.show`)."""
     changed = _changed(net, [(adapter, 1.0)])
     if not adapter.sees_given:
         return changed
@@ -192,18 +190,6 @@ def _changed(net: PriorSession, adapters: Sequence[tuple[Adapter, float]]) -> Pr
                 whole += np.float32(factor) * change
         weights[f"{NET}{name}.weight"] = whole
     return replace(net, weights=weights)
-
-
-def show(net: PriorSession, bound: Bound, given: Floats, mask: NDArray[np.bool_]) -> Bound:
-    """The condition that shows a network what is given, if it takes one.
-
-    Args:
-        net: the network, such as one of `adapted`.
-        bound: its condition, of ``rows`` rows.
-        given: (rows, frames, features) standardised; what is not given may be anything finite.
-        mask: the same shape, bool: which numbers are given.
-    """
-    return net.show(bound, given, mask)
 
 
 def _shapes(

@@ -7,35 +7,21 @@ sizes, the prior it belongs to (name and `fingerprint`), licence, provenance. No
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
 from motionloom.runtime.pair import PairConfig, PairSession
-from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.session import check_graph
 from motionloom.runtime.shapes import pair_shapes
 from motionloom.runtime.text.known import Known, pack_known, unpack_known
 from motionloom.weights.adapter import origin
 from motionloom.weights.container import PAIRS, check, check_graphs, finite, graph_tensors, halved, split_graphs
+from motionloom.weights.prior import Prior
 
 UNKNOWN = "unknown: ask whoever gave you this file"
 _TEXTS = ("name", "base", "fingerprint", "licence", "data")
-
-
-class HasNet(Protocol):
-    """A prior, as far as a block looks at it."""
-
-    @property
-    def net(self) -> PriorSession: ...
-    @property
-    def schedule(self) -> Schedule: ...
-    @property
-    def mean(self) -> np.ndarray: ...
-    @property
-    def std(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +47,7 @@ class PairBlock:
     """What pairs it has learned, in words; None: its file does not say."""
 
     @staticmethod
-    def load(block: str | Path, prior: HasNet) -> "PairBlock":
+    def load(block: str | Path, prior: Prior) -> "PairBlock":
         """A shipped block by name, or one from a file, for this prior.
 
         Raises `MotionloomError` for a file that is missing, damaged or too large, and for another prior's block.
@@ -91,11 +77,11 @@ class PairBlock:
             tensors |= table
         return PAIRS.write(path, tensors, about)
 
-    def weights(self, prior: HasNet) -> dict[str, np.ndarray]:
+    def weights(self, prior: Prior) -> dict[str, np.ndarray]:
         """All that the graph is filled with."""
         return {**prior.net.weights, **self.tensors, "mean": prior.mean, "std": prior.std}
 
-    def net(self, prior: HasNet) -> PairSession:
+    def net(self, prior: Prior) -> PairSession:
         """The network of two people, on the prior's device, ready to sample."""
         return PairSession(self.config, self.tensors, self.graph, prior.net, prior.schedule, prior.mean, prior.std)
 

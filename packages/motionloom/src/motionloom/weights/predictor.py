@@ -189,7 +189,11 @@ def load_predictor(path: Path) -> Predictor:
 
 def _statistics(path: Path, tensors: dict[str, Array], config: PredictorConfig) -> tuple[Array, Array, Array]:
     """Mean and std of the spectra, and the pose's."""
-    mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))
+    names = ("mean", "std", "pose")
+    mean, std, pose = (tensors.get(name, np.empty(0)).astype(np.float32) for name in names)
+    for name, values in zip(names, (mean, std, pose), strict=True):
+        if not values.size or not np.isfinite(values).all():
+            raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
     shape = (config.kept, config.channels)
     fits = mean.shape == shape and std.shape == shape and pose.shape == (2, config.channels)
     if not fits or std.min() <= 0 or pose[1].min() <= 0:
@@ -201,10 +205,3 @@ def _basis(kept: int, frames: Any, dct: Any) -> Basis:
     if type(frames) is not int or not kept <= frames <= LONGEST_WINDOW or (dct is not True and kept != frames):
         raise ValueError(f"{kept} of {frames!r} frequencies")
     return Dct(frames, kept) if dct is True else Frames(frames)
-
-
-def _usable(path: Path, tensors: dict[str, Array], name: str) -> Array:
-    values = tensors.get(name, np.empty(0)).astype(np.float32)
-    if not values.size or not np.isfinite(values).all():
-        raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
-    return values

@@ -1,6 +1,6 @@
 """Splitting into word pieces against splits known from the BERT paper and its published tokenizer."""
 
-from motionloom.runtime.text.wordpiece import make_tokenizer
+from motionloom.runtime.text.minilm import make_tokenizer
 from tests.recorded.tiny import VOCABULARY
 
 

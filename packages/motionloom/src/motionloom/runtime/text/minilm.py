@@ -7,12 +7,28 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from tokenizers import Tokenizer, models, normalizers, pre_tokenizers
 
 from motionloom.errors import MotionloomError
 from motionloom.runtime.session import Session, check_graph
 from motionloom.runtime.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 from motionloom.runtime.text.quantise import dequantise, quantise
-from motionloom.runtime.text.wordpiece import END, SPECIALS, START, make_tokenizer
+
+PAD, UNKNOWN, START, END, MASK = "[PAD]", "[UNK]", "[CLS]", "[SEP]", "[MASK]"
+SPECIALS = (PAD, UNKNOWN, START, END, MASK)
+
+
+def make_tokenizer(vocabulary: Sequence[str]) -> Tokenizer:
+    """WordPiece as BERT does it: lower case, no accents, split at spaces and punctuation, longest piece first.
+
+    Ids are places in the vocabulary; no start or end marks are added and nothing is truncated.
+    """
+    ids = {piece: place for place, piece in enumerate(vocabulary)}
+    tokenizer = Tokenizer(models.WordPiece(vocab=ids, unk_token=UNKNOWN, max_input_chars_per_word=100))
+    tokenizer.normalizer = normalizers.BertNormalizer()
+    tokenizer.pre_tokenizer = pre_tokenizers.BertPreTokenizer()
+    return tokenizer
+
 
 HEAD_WIDTH = 32
 LENGTH = 64  # word pieces, start and end marks included
