@@ -14,7 +14,9 @@ Numbers = TypeVar("Numbers", bound=Any)
 
 def namespace(numbers: Any) -> Any:
     """The library with the functions for these numbers: numpy, or torch for tensors."""
-    return np if isinstance(numbers, np.ndarray | np.generic | float) else sys.modules["torch"]
+    if isinstance(numbers, np.ndarray | np.generic | float):
+        return np
+    return sys.modules["torch"]
 
 
 def stack(*numbers: Any) -> Any:

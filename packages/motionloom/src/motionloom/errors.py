@@ -77,4 +77,6 @@ def kind_of(value: Any) -> str:
         return quoted(value)
     if isinstance(value, Mapping):
         return "a mapping"
-    return f"a list of {len(value)}" if isinstance(value, list | tuple) else f"a {type(value).__name__}"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return f"a {type(value).__name__}"

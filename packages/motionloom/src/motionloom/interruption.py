@@ -9,7 +9,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+_SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 
 
 class _State:
@@ -29,7 +30,8 @@ def interruptible() -> Iterator[None]:
         return
     _State.waiting = _State.received = False
     before = {number: signal.getsignal(number) for number in _SIGNALS}
-    changed = {number: old for number, old in before.items() if old is not None and old != signal.SIG_IGN}
+    ignored = (None, signal.SIG_IGN)
+    changed = {number: old for number, old in before.items() if old not in ignored}
     try:
         for number in changed:
             signal.signal(number, _interrupt)

@@ -92,22 +92,17 @@ class Motion:
             places[:, j] = places[:, p] + rot.rotate(world[:, p], np.broadcast_to(offset, (len(self), 3)))
         return places
 
-    def frames(self, start: int, stop: int) -> "Motion":
-        """Frames ``start`` to ``stop`` (half-open)."""
-        return replace(
-            self,
-            root=self.root[start:stop],
-            rotations=self.rotations[start:stop],
-            translations=None if self.translations is None else self.translations[start:stop],
-        )
+    def frames(self, start: int, stop: int, step: int = 1) -> "Motion":
+        """Frames ``start`` to ``stop`` (half-open), every ``step``-th of them."""
+        some = slice(start, stop, step)
+        moved = None if self.translations is None else self.translations[some]
+        turned = self.rotations[some]
+        return Motion(self.skeleton, self.fps, self.root[some], turned, moved)
 
     def thinned(self, most: int) -> "Motion":
         """Every so many-th frame, at the rate that goes with it, so that there are at most ``most``."""
         step = -(-len(self) // most)
-        moved = None if self.translations is None else self.translations[::step]
-        return replace(
-            self, fps=self.fps / step, root=self.root[::step], rotations=self.rotations[::step], translations=moved
-        )
+        return replace(self.frames(0, len(self), step), fps=self.fps / step)
 
     def crop(self, start_s: float, end_s: float) -> "Motion":
         """The part from ``start_s`` to ``end_s`` seconds; raises `MotionloomError` where that is no frame."""
@@ -147,11 +142,10 @@ class Motion:
             a = amount.reshape(-1, *[1] * (x.ndim - 1))
             return x[low] * (1 - a) + x[high] * a
 
-        turned = rot.slerp(
-            self.rotations[low], self.rotations[high], np.broadcast_to(amount[:, None], self.rotations[low].shape[:2])
-        )
+        first, last = self.rotations[low], self.rotations[high]
+        turned = rot.slerp(first, last, np.broadcast_to(amount[:, None], first.shape[:2]))
         moved = None if self.translations is None else lerp(self.translations)
-        return replace(self, fps=float(fps), root=lerp(self.root), rotations=turned, translations=moved)
+        return Motion(self.skeleton, float(fps), lerp(self.root), turned, moved)
 
     def placed(self, place: GroundPose) -> "Motion":
         """A motion that starts at the origin facing +Z, started at ``place`` instead."""
@@ -159,14 +153,17 @@ class Motion:
         rotations[:, 0] = rot.multiply(rot.rotvec_to_quat(np.array([0.0, place.facing, 0.0])), rotations[:, 0])
         return replace(self, root=place.to_world(self.root), rotations=rot.unroll(rotations))
 
+    def turned(self, turn: np.ndarray) -> "Motion":
+        """The motion turned about the world's origin by a quaternion (4,)."""
+        rotations = self.rotations.copy()
+        rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
+        return replace(self, root=rot.rotate(turn, self.root), rotations=rotations)
+
     def scaled(self, size: float) -> "Motion":
         """The same motion of a body, and over a way, ``size`` times as large."""
-        return replace(
-            self,
-            skeleton=self.skeleton.scaled(size),
-            root=self.root * size,
-            translations=None if self.translations is None else self.translations * size,
-        )
+        moved = None if self.translations is None else self.translations * size
+        skeleton = self.skeleton.scaled(size)
+        return Motion(skeleton, self.fps, self.root * size, self.rotations, moved)
 
     def mirror(self) -> "Motion":
         """Left and right exchanged: reflected in the plane x = 0, joint names swapped by side.
@@ -176,12 +173,8 @@ class Motion:
         pairs = list(self.skeleton.mirror_pairs())
         flip = np.array([-1.0, 1.0, 1.0])
         moved = None if self.translations is None else self.translations[:, pairs] * flip
-        return replace(
-            self,
-            root=self.root * flip,
-            rotations=self.rotations[:, pairs] * np.array([1.0, 1.0, -1.0, -1.0]),
-            translations=moved,
-        )
+        turned = self.rotations[:, pairs] * np.array([1.0, 1.0, -1.0, -1.0])
+        return Motion(self.skeleton, self.fps, self.root * flip, turned, moved)
 
 
 def heading(positions: np.ndarray) -> Array:
@@ -194,7 +187,8 @@ def heading(positions: np.ndarray) -> Array:
         (frames,) radians, unwrapped: 0 faces +Z, growing to the left (towards +X).
     """
     p = np.asarray(positions, dtype=np.float64)
-    across = p[:, _LEFT_HIP] - p[:, _RIGHT_HIP] + p[:, _LEFT_SHOULDER] - p[:, _RIGHT_SHOULDER]
+    across = p[:, _LEFT_HIP] - p[:, _RIGHT_HIP]
+    across = across + p[:, _LEFT_SHOULDER] - p[:, _RIGHT_SHOULDER]
     return np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))
 
 

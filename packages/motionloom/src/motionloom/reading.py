@@ -62,6 +62,16 @@ def _sized(size: int) -> str:
     return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
 
 
+def read_json(path: Path | str, what: str) -> Any:
+    """The JSON of a small file; raises `MotionloomError` where it cannot be read as ``what``, such as ``a map``."""
+    try:
+        return json.loads(read_bytes(path, max_bytes=1_000_000).decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, MotionloomError):
+            raise
+        raise MotionloomError(f"{path} cannot be read as {what} in JSON: {error}") from None
+
+
 def read_table(package: str, file: str) -> Any:
     """The content of a .toml or .json file that ships in a package, such as ``motionloom.cli``."""
     text = (resources.files(package) / file).read_text(encoding="utf-8")

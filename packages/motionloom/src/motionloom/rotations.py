@@ -32,7 +32,8 @@ def inverse(q: np.ndarray) -> Array:
 def cross(a: np.ndarray, b: np.ndarray) -> Array:
     """Cross product of vectors ``(..., 3)``; NumPy's own spends more on its axes than on the product."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 

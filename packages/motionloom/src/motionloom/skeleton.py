@@ -112,12 +112,13 @@ class Skeleton:
             line.append(self.parents[line[-1]])
         return line
 
-    def below(self, joint: int) -> list[int]:
-        """The joint and everything under it, by number."""
-        found = [joint]
-        for one in found:  # which grows meanwhile
-            found += self.children(one)
-        return sorted(found)
+    def below(self, *joints: int) -> list[int]:
+        """The joints and everything under them, by number."""
+        inside = set(joints)
+        for j, parent in enumerate(self.parents):
+            if parent in inside:
+                inside.add(j)
+        return sorted(inside)
 
     def resolve(self, names: Iterable[str]) -> tuple[int, ...]:
         """Joint numbers for a mix of joint and group names, in skeleton order."""
@@ -175,61 +176,35 @@ def _swaps(name: str, old: str, new: str) -> list[str]:
     return [name[:i] + new + name[i + len(old) :] for i in at]
 
 
-_SMPL22 = """pelvis - | left_hip pelvis | right_hip pelvis | spine1 pelvis | left_knee left_hip | right_knee right_hip
-| spine2 spine1 | left_ankle left_knee | right_ankle right_knee | spine3 spine2 | left_foot left_ankle
-| right_foot right_ankle | neck spine3 | left_collar spine3 | right_collar spine3 | head neck
-| left_shoulder left_collar | right_shoulder right_collar | left_elbow left_shoulder | right_elbow right_shoulder
-| left_wrist left_elbow | right_wrist right_elbow"""
-
-# Bone lengths of the uniform HumanML3D person by child joint 1..21, metres (specs of the published data set).
-HUMANML_BONE_LENGTHS: tuple[float, ...] = (
-    0.1031,
-    0.1099,
-    0.1316,
-    0.3936,
-    0.3902,
-    0.1432,
-    0.4324,
-    0.4256,
-    0.0574,
-    0.1434,
-    0.1494,
-    0.2194,
-    0.1375,
-    0.1434,
-    0.1030,
-    0.1316,
-    0.1230,
-    0.2568,
-    0.2631,
-    0.2660,
-    0.2699,
-)
-
-# Directions of a natural T-pose, by child joint 1..21 (the published rest directions are not a pose).
-_T_POSE = (
-    (0.62, -0.78, 0),
-    (-0.62, -0.78, 0),
-    (0, 1, -0.15),
-    (0, -1, 0),
-    (0, -1, 0),
-    (0, 1, 0),
-    (0, -1, -0.06),
-    (0, -1, -0.06),
-    (0, 1, 0.05),
-    (0.1, -0.42, 0.9),
-    (-0.1, -0.42, 0.9),
-    (0, 1, -0.12),
-    (0.55, 0.83, -0.08),
-    (-0.55, 0.83, -0.08),
-    (0, 0.86, 0.5),
-    (1, 0.25, -0.1),
-    (-1, 0.25, -0.1),
-    (1, 0, 0),
-    (-1, 0, 0),
-    (1, 0, 0),
-    (-1, 0, 0),
-)
+# Joint, parent, metres between the two of the uniform HumanML3D person (specs of the published data set), and the
+# direction in a natural T-pose (the published rest directions are not a pose).
+_SMPL22 = """
+pelvis         -                   0     0     0     0
+left_hip       pelvis         0.1031  0.62 -0.78     0
+right_hip      pelvis         0.1099 -0.62 -0.78     0
+spine1         pelvis         0.1316     0     1 -0.15
+left_knee      left_hip       0.3936     0    -1     0
+right_knee     right_hip      0.3902     0    -1     0
+spine2         spine1         0.1432     0     1     0
+left_ankle     left_knee      0.4324     0    -1 -0.06
+right_ankle    right_knee     0.4256     0    -1 -0.06
+spine3         spine2         0.0574     0     1  0.05
+left_foot      left_ankle     0.1434   0.1 -0.42   0.9
+right_foot     right_ankle    0.1494  -0.1 -0.42   0.9
+neck           spine3         0.2194     0     1 -0.12
+left_collar    spine3         0.1375  0.55  0.83 -0.08
+right_collar   spine3         0.1434 -0.55  0.83 -0.08
+head           neck           0.1030     0  0.86   0.5
+left_shoulder  left_collar    0.1316     1  0.25  -0.1
+right_shoulder right_collar   0.1230    -1  0.25  -0.1
+left_elbow     left_shoulder  0.2568     1     0     0
+right_elbow    right_shoulder 0.2631    -1     0     0
+left_wrist     left_elbow     0.2660     1     0     0
+right_wrist    right_elbow    0.2699    -1     0     0
+"""
+_ROWS = [row.split() for row in _SMPL22.strip().split("\n")]
+HUMANML_BONE_LENGTHS: tuple[float, ...] = tuple(float(row[2]) for row in _ROWS[1:])
+"""Metres of the uniform person's bones, by child joint 1..21."""
 
 _SMPL22_GROUPS = {
     "left_leg": (1, 4, 7, 10),
@@ -246,10 +221,9 @@ _SMPL22_GROUPS = {
 
 
 def _smpl22() -> Skeleton:
-    pairs = [entry.split() for entry in _SMPL22.split("|")]
-    names = tuple(name for name, _ in pairs)
-    parents = tuple(-1 if parent == "-" else names.index(parent) for _, parent in pairs)
-    directions = np.array(_T_POSE, dtype=np.float64)
+    names = tuple(row[0] for row in _ROWS)
+    parents = tuple(-1 if row[1] == "-" else names.index(row[1]) for row in _ROWS)
+    directions = np.array([row[3:] for row in _ROWS[1:]], dtype=np.float64)
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     offsets = np.concatenate([np.zeros((1, 3)), directions * np.array(HUMANML_BONE_LENGTHS)[:, None]])
     offsets[0, 1] = -offsets[[1, 4, 7, 10], 1].sum()  # the toes stand on the floor at rest

@@ -8,7 +8,7 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.io.bvh import load_bvh, save_bvh
-from motionloom.io.bvh_tips import is_tip, tip
+from motionloom.io.bvh_writer import is_tip, tip
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.rigged import wave

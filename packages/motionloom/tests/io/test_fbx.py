@@ -12,8 +12,9 @@ import pytest
 from motionloom import rotations as rot
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
-from motionloom.io import blender, load, save
+from motionloom.io import blender, load, open_character, save
 from motionloom.motion import Motion
+from motionloom.retarget import retarget
 from motionloom.skeleton import SMPL22
 from tests.cli.said import complaint
 from tests.io.rigged import Hero, wave
@@ -68,6 +69,19 @@ def test_what_blender_makes_is_read_under_the_files_own_name(tmp_path: Path) -> 
             load(tmp_path / "in.fbx", clip="jump")
         with pytest.warns(UserWarning, match=r"in\.fbx has 2 clips"):
             load(tmp_path / "in.fbx")
+
+
+def test_a_character_of_an_fbx_is_read_under_its_name_and_needs_no_file(tmp_path: Path) -> None:
+    hero = Hero()
+    hero.json["nodes"].append({"name": "helmet", "mesh": 0})
+    hero.json["scenes"][0]["nodes"].append(25)
+    hero.write(tmp_path / "made.glb")
+    (tmp_path / "in.fbx").write_bytes(b"something")
+    copies = stand_in(tmp_path, f"shutil.copyfile({str(tmp_path / 'made.glb')!r}, made)")
+    with blender.using(copies), pytest.warns(UserWarning, match=r"in\.fbx: 'helmet' hang on no bone"):
+        character = open_character(tmp_path / "in.fbx")
+    assert not character.path.exists()
+    assert load(character.save(retarget(waver(), character.skeleton), tmp_path / "moving.glb")).fps == 24.0
 
 
 def test_what_blender_gets_is_a_glb_and_its_rate(tmp_path: Path) -> None:

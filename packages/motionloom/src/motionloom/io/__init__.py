@@ -47,7 +47,7 @@ def load(
     found = _checked(path, fps, unit=unit, asf=asf)
     if clip is not None and not found.clips:
         raise MotionloomError(f"{path} holds one motion; a clip is chosen in {', '.join(formats.with_clips())} files")
-    own = {name: value for name, value in options.items() if value is not None and name in found.options}
+    own = {name: options[name] for name in found.options if options.get(name) is not None}
     motion = _call(found.reader, path, **own)
     motion = motion if fps is None or "fps" in own else replace(motion, fps=fps)
     return motion if unit is None or "unit" in own else motion.scaled(unit)

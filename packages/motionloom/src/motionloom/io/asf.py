@@ -62,9 +62,8 @@ def load_asf_amc(asf: Path | str, amc: Path | str, *, fps: float | None = None, 
     """
     skeleton = read_asf(asf)
     values, degrees = read_amc(amc, skeleton)
-    return _assemble(
-        skeleton, values, degrees, AMC_FPS if fps is None else fps, skeleton.unit if unit is None else unit
-    )
+    fps = AMC_FPS if fps is None else fps
+    return _assemble(skeleton, values, degrees, fps, skeleton.unit if unit is None else unit)
 
 
 def load_amc(
@@ -246,7 +245,8 @@ def read_amc(path: Path | str, asf: Asf) -> tuple[dict[str, Array], bool]:
     for line, raw in enumerate(data.split(b"\n"), start=1):
         words = raw.split()
         if not words or words[0][:1] in b"#:":
-            degrees = {b":DEGREES": True, b":RADIANS": False}.get(words[0].upper(), degrees) if words else degrees
+            if words:
+                degrees = {b":DEGREES": True, b":RADIANS": False}.get(words[0].upper(), degrees)
         elif len(words) == 1 and words[0].isdigit():
             whole = _close_frame(seen, whole, (path, line, len(counters)))
             counters.append(int(words[0][:18]))
@@ -333,8 +333,7 @@ def _local(bone: Bone, values: Array | None, scale: float, frames: int) -> Array
     if values is None or not turns:
         return np.tile(rot.IDENTITY, (frames, 1))
     order = "".join(axis for axis, _ in turns)
-    angles = values[:, [i for _, i in turns]] * scale
-    own = rot.euler_to_quat(order[::-1], angles[:, ::-1])
+    own = _turn(order, values[:, [i for _, i in turns]] * scale)
     axis = _turn(bone.axis_order, np.array(bone.axis))
     return rot.multiply(rot.multiply(axis, own), rot.inverse(axis))
 
@@ -398,7 +397,8 @@ def find_asf(amc: Path | str) -> Path:
     """The skeleton beside an AMC file: of the same name, of the subject (``39_01.amc``: ``39.asf``) or the only one."""
     amc = Path(amc)
     stems = (amc.stem, re.split(r"[_-]", amc.stem)[0])
-    beside = [p for p in finished(amc.parent, "*") if p.suffix.lower() == ".asf"] if amc.parent.is_dir() else []
+    there = finished(amc.parent, "*") if amc.parent.is_dir() else []
+    beside = [path for path in there if path.suffix.lower() == ".asf"]
     for stem in stems:
         for path in beside:
             if path.stem == stem:

@@ -85,7 +85,9 @@ def find_blender() -> list[str]:
 
 def _command(place: str) -> list[str]:
     python = Path(place).name.lower().find("python") >= 0
-    return [place] if python else [place, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
+    if python:
+        return [place]
+    return [place, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
 
 
 def fbx_to_glb(source: Path, folder: Path) -> Path:
@@ -125,6 +127,7 @@ def _convert(source: Path, made: Path, *, fps: float) -> None:
         except OSError as error:
             raise MotionloomError(f"{command[0]} cannot be run: {error.strerror or error}") from None
     if ended.returncode or not made.is_file() or not made.stat().st_size:
-        lines = [line for line in (ended.stdout + ended.stderr).splitlines() if "rror" in line]
+        output = ended.stdout + ended.stderr
+        lines = [line for line in output.splitlines() if "rror" in line]
         said = one_line(lines[-1])[:200] if lines else f"it ended with {ended.returncode}"
         raise MotionloomError(f"Blender could not convert {source}: {said}")

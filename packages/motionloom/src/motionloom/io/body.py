@@ -4,12 +4,14 @@ Sizes come from `figure`. Pieces are measured in the joints' own frames over the
 that is no natural pose (all bones along one axis, say) gives the same body.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.viz.figure import Figure, figure
 
@@ -43,41 +45,44 @@ class Piece:
     """(triangles, 3), counter-clockwise from outside."""
 
 
+def check_people(motions: Sequence[Motion], names: Sequence[str] | None) -> None:
+    """Refuse to write nobody, and people with names of another count."""
+    if not motions:
+        raise MotionloomError("there is no motion to save; give at least one")
+    if names is not None and len(names) != len(motions):
+        raise MotionloomError(f"{len(motions)} motions need as many names; got {len(names)}")
+
+
 def body(motion: Motion) -> list[Piece]:
     """The pieces of a person for a motion's skeleton; none for a skeleton without bones."""
     step = max(1, len(motion) // MAX_FRAMES)
-    short = Motion(
-        motion.skeleton,
-        motion.fps,
-        motion.root[::step],
-        motion.rotations[::step],
-        None if motion.translations is None else motion.translations[::step],
-    )
+    short = motion.frames(0, len(motion), step)
     shape = figure(short)
     world = short.world_rotations()
-    pieces = [_bone(motion, shape, world, i) for i in range(len(shape.bones)) if shape.bones[i][1] not in shape.trunk]
-    pieces += [
-        _trunk(shape, world, joints, wide) for joints, wide in ((shape.chest, 0.042), (shape.hips, 0.05)) if joints
-    ]
+    limbs = [i for i, (_, child) in enumerate(shape.bones) if child not in shape.trunk]
+    pieces = [_bone(motion, shape, world, i) for i in limbs]
+    for joints, wide in ((shape.chest, 0.042), (shape.hips, 0.05)):
+        pieces += [_trunk(shape, world, joints, wide)] if joints else []
     if shape.chest and shape.hips:
         pieces.append(_between(shape, world))
     pieces.append(_head(shape, world))
     return [p for p in pieces if p is not None]
 
 
-def _local(shape: Figure, world: Array, joint: int, target: Array) -> Array:
+def _local(world: Array, joint: int, target: Array) -> Array:
     """A moving point or direction (frames, 3) as it usually lies in a joint's frame."""
     return np.median(rot.rotate(rot.inverse(world[:, joint]), target), axis=0)
 
 
 def _local_to(shape: Figure, world: Array, joint: int, point: Array) -> Array:
-    return _local(shape, world, joint, point - shape.places[:, joint])
+    return _local(world, joint, point - shape.places[:, joint])
 
 
 def _bone(motion: Motion, shape: Figure, world: Array, i: int) -> Piece | None:
     parent, child = shape.bones[i]
     tip = _local_to(shape, world, parent, shape.places[:, child])
-    piece = _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), np.repeat(shape.radii[i], 2).reshape(2, 2))
+    radii = np.repeat(shape.radii[i], 2).reshape(2, 2)
+    piece = _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), radii)
     below = motion.skeleton.children(child)
     foot = set(below) <= motion.skeleton.ends and set(shape.hips[:-1]) & set(motion.skeleton.ancestors(parent))
     return _with_sole(piece, shape, world, child) if piece is not None and foot else piece
@@ -88,7 +93,7 @@ def _with_sole(piece: Piece, shape: Figure, world: Array, toe: int) -> Piece:
     standing = shape.contacts[:, toe]
     if not standing.any():
         return piece
-    up = np.median(rot.rotate(rot.inverse(world[standing, piece.joint]), np.array([0.0, 1.0, 0.0])), axis=0)
+    up = _local(world[standing], piece.joint, np.array([0.0, 1.0, 0.0]))
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     sole = float(np.median(shape.floor - shape.places[standing, piece.joint, 1]))
     under = np.maximum(sole - piece.points @ up, 0.0)
@@ -107,7 +112,7 @@ def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) ->
         return None
     a, b = (_local_to(shape, world, base, shape.places[:, j[0]]) for j in (left, right))
     across, middle = a - b, (a + b) / 2
-    up = _local(shape, world, base, np.broadcast_to([0.0, 1.0, 0.0], (len(world), 3)))
+    up = _local(world, base, np.broadcast_to([0.0, 1.0, 0.0], (len(world), 3)))
     half = float(np.linalg.norm(across)) / 2
     if half < 1e-4 * height:
         return None
@@ -115,7 +120,8 @@ def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) ->
     low = -0.03 * height * up if chest else middle - 0.02 * height * up
     top = middle if chest else np.maximum(0.03 * height, 0.0) * up
     wides = [0.62 * half + wide * height, 0.92 * half + 0.5 * wide * height]
-    wides = wides if chest else [half + 0.75 * wide * height, 0.6 * half + 0.9 * wide * height]
+    if not chest:
+        wides = [half + 0.75 * wide * height, 0.6 * half + 0.9 * wide * height]
     rings = np.array([[wides[0], 1.2 * wide * height], [wides[1], wide * height]])
     return _loft(base, 0, np.stack([low, top]), rings, across=across)
 
@@ -124,7 +130,7 @@ def _between(shape: Figure, world: Array) -> Piece | None:
     """The belly, carried by the pelvis."""
     tip = _local_to(shape, world, shape.centre, shape.places[:, shape.chest[-1]])
     a, b = (shape.places[:, next(j for j in shape.hips if shape.sides[j] == s)] for s in (1, -1))
-    across = _local(shape, world, shape.centre, a - b)
+    across = _local(world, shape.centre, a - b)
     rings = shape.height * np.array([[0.075, 0.055], [0.078, 0.055]])
     return _loft(shape.centre, 0, np.stack([np.zeros(3), tip]), rings, across=across)
 
@@ -135,13 +141,13 @@ def _head(shape: Figure, world: Array) -> Piece | None:
     below, joint = shape.head
     carrier = below if shape.head_is_tip else joint
     direction = shape.places[:, joint] - shape.places[:, below]
-    up = _local(shape, world, carrier, direction)
+    up = _local(world, carrier, direction)
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     tip = _local_to(shape, world, carrier, shape.places[:, joint])
     radius = 0.055 * shape.height
     middle = tip - 0.75 * radius * up if shape.head_is_tip else tip + 0.85 * radius * up
     ends = np.stack([middle - 0.3 * radius * up, middle + 0.3 * radius * up])
-    front = _local(shape, world, carrier, shape.gaze)
+    front = _local(world, carrier, shape.gaze)
     across = np.cross(up, front)
     return _loft(carrier, 2, ends, radius * np.array([[0.8, 0.95], [0.95, 1.1]]), across=across)
 

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import text
-from motionloom.io.bvh_tips import is_tip
-from motionloom.io.bvh_writer import SAME_PLACE, end_name, moving_offsets, save_bvh
+from motionloom.io.bvh_writer import SAME_PLACE, end_name, is_tip, moving_offsets, save_bvh
 from motionloom.motion import Motion
 from motionloom.skeleton import Poses, Skeleton
 
@@ -72,9 +71,9 @@ def read_bvh(path: Path | str, *, fps: float | None = None, unit: float | None =
     if split is None:
         raise MotionloomError(f"{path} has no MOTION part; the file is cut off or not a BVH file")
     joints = _hierarchy(data[: split.start()], path)
-    frames = _frames(data, split.end(), joints, path)
+    rate, frames = _frames(data, split.end(), joints, path)
     del data, split  # a long file's text and its numbers are not both held from here on
-    return _assemble(joints, frames, fps, unit)
+    return _assemble(frames, rate if fps is None else fps, unit)
 
 
 # Hierarchy -----------------------------------------------------------------------------------------------------------
@@ -192,17 +191,17 @@ def _check_joints(joints: list[_Joint], path: Path | str) -> None:
 
 
 def _without_empty_ends(joints: list[_Joint]) -> list[_Joint]:
-    """The joints without End Sites at no distance, and without those that say no more than `bvh_tips` does."""
+    """The joints without End Sites at no distance, and without those that `is_tip` knows."""
     alone = Counter(j.parent for j in joints)
-    kept = [i for i, j in enumerate(joints) if not (j.end and _says_nothing(j, joints[j.parent], alone[j.parent] == 1))]
+    kept = []
+    for i, joint in enumerate(joints):
+        end, offset = joint.offset or (), joints[joint.parent].offset or (0.0, 0.0, 0.0)
+        says_nothing = not any(end) or (alone[joint.parent] == 1 and is_tip(offset, end))
+        kept += [] if joint.end and says_nothing else [i]
     place = {old: new for new, old in enumerate(kept)} | {-1: -1}
     for i in kept:
         joints[i].parent = place[joints[i].parent]
     return [joints[i] for i in kept]
-
-
-def _says_nothing(end: _Joint, joint: _Joint, alone: bool) -> bool:
-    return not any(end.offset or ()) or (alone and is_tip(joint.offset or (0.0, 0.0, 0.0), end.offset or ()))
 
 
 def _describe(words: _Words, key: str, joint: _Joint) -> None:
@@ -235,20 +234,10 @@ _RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 200, 240)
 _BROADCAST = (12.5, 24000 / 1001, 30000 / 1001, 60000 / 1001)
 
 
-@dataclass(frozen=True, eq=False)
-class _Frames:
-    fps: float
-    rotations: Array
-    """(frames, joints, 4)."""
-    moved: dict[int, int]
-    """For each joint with position channels its column in ``places``."""
-    places: Array
-    """(frames, joints with position channels, 3) in the file's unit."""
-
-
-def _frames(data: bytes, start: int, joints: list[_Joint], path: Path | str) -> _Frames:
-    """The frames, read some at a time: of a long file neither all text nor all numbers are held twice."""
-    line, columns = data.count(b"\n", 0, start) + 1, sum(len(j.channels) for j in joints)
+def _frames(data: bytes, start: int, joints: list[_Joint], path: Path | str) -> "tuple[float, _Reader]":
+    """Frames per second, and the frames, read some at a time: neither text nor numbers are kept twice."""
+    line = data.count(b"\n", 0, start) + 1
+    columns = sum(len(j.channels) for j in joints)
     head = _HEAD.match(data, start)
     if head is None:
         raise MotionloomError(f"{path}, line {line}: MOTION must be followed by 'Frames: N' and 'Frame Time: SECONDS'")
@@ -270,11 +259,15 @@ def _frames(data: bytes, start: int, joints: list[_Joint], path: Path | str) -> 
         reader.take(block)
     if reader.numbers != total:
         _complain(data, head.end(), int(count), columns, path=path, first=first)
-    return _Frames(rate, reader.rotations, reader.moved, reader.places)
+    return rate, reader
 
 
 class _Reader:
-    """Turns rows of numbers into rotations and places, into arrays for so many frames; more are only counted."""
+    """Turns rows of numbers into arrays for so many frames; more are only counted.
+
+    ``rotations`` are (frames, joints, 4); of joints with position channels ``moved`` has the columns in ``places``
+    (frames, such joints, 3), in the file's unit.
+    """
 
     def __init__(self, joints: list[_Joint], frames: int) -> None:
         self.joints, self.frames, self.numbers = joints, frames, 0
@@ -340,7 +333,8 @@ def _complain(data: bytes, start: int, count: int, columns: int, *, path: Path |
 # Assembly ------------------------------------------------------------------------------------------------------------
 
 
-def _assemble(joints: list[_Joint], frames: _Frames, fps: float | None, unit: float | None) -> Bvh:
+def _assemble(frames: _Reader, fps: float, unit: float | None) -> Bvh:
+    joints = frames.joints
     offsets = np.array([j.offset or (0.0, 0.0, 0.0) for j in joints])
     parents = tuple(j.parent for j in joints)
     places = {j: frames.places[:, k] for j, k in frames.moved.items() if j == 0 or frames.places[:, k].any()}
@@ -358,20 +352,13 @@ def _assemble(joints: list[_Joint], frames: _Frames, fps: float | None, unit: fl
         if translations is not None:
             np.multiply(place, scale, out=translations[:, j])
     some = slice(None, None, -(-len(root) // _POSES))
-    poses = Poses(
-        root[some].copy(), frames.rotations[some].copy(), None if translations is None else translations[some].copy()
-    )
-    skeleton = Skeleton(
-        tuple(j.name for j in joints),
-        parents,
-        offsets * scale,
-        frozenset(i for i, j in enumerate(joints) if j.end),
-        poses=poses,
-    )
-    orders = {joints[j].name: order for order, members in _orders(joints).items() for j, _ in members}
-    return Bvh(
-        Motion(skeleton, frames.fps if fps is None else fps, root, frames.rotations, translations), scale, orders
-    )
+    moved = None if translations is None else translations[some].copy()
+    poses = Poses(root[some].copy(), frames.rotations[some].copy(), moved)
+    names = tuple(joint.name for joint in joints)
+    ends = frozenset(i for i, joint in enumerate(joints) if joint.end)
+    skeleton = Skeleton(names, parents, offsets * scale, ends, poses=poses)
+    orders = {joints[j].name: order for order, members in frames.orders.items() for j, _ in members}
+    return Bvh(Motion(skeleton, fps, root, frames.rotations, translations), scale, orders)
 
 
 def _columns(joints: list[_Joint]) -> list[int]:
@@ -397,7 +384,10 @@ def unit_that_reads_back(motion: Motion, unit: float) -> float:
     offsets, moving = moving_offsets(motion)
     lengths = np.where(np.isin(np.arange(len(offsets)), list(moving))[:, None], 0.0, offsets)
     tries = (unit, 1.0, 0.01, 0.0254, 0.0254 / 0.45, 0.001)
-    return next((u for u in tries if abs(guess_unit(motion.skeleton.parents, lengths / u) / u - 1) < 1e-9), unit)
+    for one in tries:
+        if abs(guess_unit(motion.skeleton.parents, lengths / one) / one - 1) < 1e-9:
+            return one
+    return unit
 
 
 def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:

@@ -1,6 +1,11 @@
-"""Writing BVH files; `motionloom.io.bvh` reads them and says what the format is."""
+"""Writing BVH files; `motionloom.io.bvh` reads them and says what the format is.
 
-from collections.abc import Mapping
+A hand, a head or a toe joint has no length of its own, and programs that draw bones from joint to joint want one. So
+a joint at the tip of its branch is written with an End Site at `SHARE` of its own bone's length. The share is no round
+number and is how a reader knows these End Sites again: they are no joints, and reading leaves them out.
+"""
+
+from collections.abc import Mapping, Sequence
 from io import FileIO
 from pathlib import Path
 
@@ -10,13 +15,17 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
-from motionloom.io.bvh_tips import low_joints, tip
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 SAME_PLACE = 2e-5
 """Metres: a joint that moves less than this in its parent's frame stands still there."""
+SHARE = 0.41421356
+SHORTEST = 1e-4
+"""Bones below this, in the file's unit, give their ends no length."""
+_SAME = 3e-6
+"""What rounding to six digits, here and in the bone's own OFFSET, changes at most."""
 _ROWS = 4096  # rows formatted at once
 _INDENT = 40  # deeper levels are not indented further: the file would grow with the square of the depth
 
@@ -32,7 +41,7 @@ def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str]
     ``order`` is the order of the rotation channels, for all joints or by joint name (others ``"ZXY"``); ``unit`` is
     metres per unit of length in the file: 1 for Blender, which takes the numbers for metres, 0.01 for programs that
     take them for centimetres (MotionBuilder, Maya, Unreal). Joints whose bones change length get position channels.
-    A joint at the tip of its branch that is no End Site itself gets one that gives it a length (`bvh_tips`).
+    A joint at the tip of its branch that is no End Site itself gets one that gives it a length.
     """
     with atomic_path(path) as temporary, temporary.open("wb", buffering=0) as file:
         growing = GrowingBvh(file, motion, order=order, unit=unit, frames=len(motion))
@@ -68,19 +77,19 @@ class GrowingBvh:
         if not 1e-9 < unit < 1e9:
             raise MotionloomError(f"the unit must be a positive number of metres; got {unit}")
         offsets, self.moving = moving_offsets(first)
+        # position channels say where the root is; some programs (three.js) add its OFFSET, others (Blender) do not
+        offsets = np.concatenate([np.zeros((1, 3)), offsets[1:]]) / unit
         sequence = _depth_first(skeleton)
-        tips = set(skeleton.ends) - set(skeleton.parents) - self.moving - {0}
-        self.turning = [j for j in sequence if j not in tips]
+        self.tips = set(skeleton.ends) - set(skeleton.parents) - self.moving - {0}
+        self.turning = [j for j in sequence if j not in self.tips]
         self.angles = {
             name: _Angles([j for j in self.turning if self.orders[j] == name], name) for name in set(self.orders)
         }
         self.file, self.unit, self.frames = file, unit, 0
         self.row = ("%.6f " * sum(6 if j == 0 or j in self.moving else 3 for j in self.turning))[:-1] + "\n"
         self.places = len(str(frames)) if frames else 12
-        lines = _hierarchy(
-            skeleton, sequence, tips, orders=self.orders, moving=self.moving, offsets=_without_root(offsets) / unit
-        )
-        seconds = f"{1 / first.fps:.8f}" if 0.01 < first.fps < 1000 else f"{1 / first.fps:.12g}"
+        lines = self._hierarchy(skeleton, sequence, offsets)
+        seconds = format(1 / first.fps, ".8f" if 0.01 < first.fps < 1000 else ".12g")
         self.count_at = _put(file, "\n".join([*lines, "MOTION", "Frames: "]).encode())
         self.end = self.count_at + _put(file, f"{0:>{self.places}}\nFrame Time: {seconds}\n".encode())
 
@@ -113,11 +122,32 @@ class GrowingBvh:
             columns.append(degrees[name][:, self.angles[name].at[joint]])
         return np.round(np.concatenate(columns, axis=1), 6) + 0.0  # + 0.0: no minus zero
 
-
-def _without_root(offsets: Array) -> Array:
-    """Offsets (joints, 3) with the root's at zero: its position channels say where it is, and some programs (three.js)
-    add its OFFSET to them while others (Blender) do not."""
-    return np.concatenate([np.zeros((1, 3)), offsets[1:]])
+    def _hierarchy(self, skeleton: Skeleton, sequence: list[int], offsets: Array) -> list[str]:
+        names, parents = _names(skeleton), skeleton.parents
+        with_children, low = set(parents), low_joints(parents, offsets)
+        lines, depth, open_joints = ["HIERARCHY"], 0, []
+        for joint in sequence:
+            while open_joints and open_joints[-1] != parents[joint]:
+                open_joints.pop()
+                depth -= 1
+                lines.append(_tab(depth) + "}")
+            head = "ROOT " if joint == 0 else "JOINT "
+            lines.append(_tab(depth) + ("End Site" if joint in self.tips else head + names[joint]))
+            offset = " ".join(f"{v:.6f}" for v in offsets[joint])
+            lines += [_tab(depth) + "{", _tab(depth + 1) + "OFFSET " + offset]
+            if joint not in self.tips:
+                turns = [f"{axis}rotation" for axis in self.orders[joint]]
+                placed = joint == 0 or joint in self.moving
+                places = [f"{axis}position" for axis in "XYZ"] if placed else []
+                lines.append(_tab(depth + 1) + " ".join(["CHANNELS", str(len(places + turns)), *places, *turns]))
+                if joint not in with_children:
+                    tab = _tab(depth + 1)
+                    end = " ".join(f"{v:.6f}" for v in tip(offsets[joint], level=bool(low[joint])) + 0.0)
+                    lines += [tab + line for line in ("End Site", "{", f"\tOFFSET {end}", "}")]
+            open_joints.append(joint)
+            depth += 1
+        lines += [_tab(d) + "}" for d in range(depth - 1, -1, -1)]
+        return lines
 
 
 def _put(file: FileIO, data: bytes) -> int:
@@ -141,13 +171,10 @@ def moving_offsets(motion: Motion) -> tuple[Array, set[int]]:
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:
-    children: list[list[int]] = [[] for _ in skeleton.names]
-    for joint, parent in enumerate(skeleton.parents[1:], start=1):
-        children[parent].append(joint)
     order, stack = [], [0]
     while stack:
         order.append(stack.pop())
-        stack += reversed(children[order[-1]])
+        stack += reversed(skeleton.children(order[-1]))
     return order
 
 
@@ -162,34 +189,6 @@ def _names(skeleton: Skeleton) -> list[str]:
         taken.add(name)
         names.append(name)
     return names
-
-
-def _hierarchy(
-    skeleton: Skeleton, sequence: list[int], tips: set[int], *, orders: list[str], moving: set[int], offsets: Array
-) -> list[str]:
-    names, parents = _names(skeleton), skeleton.parents
-    with_children, low = set(parents), low_joints(parents, offsets)
-    lines, depth, open_joints = ["HIERARCHY"], 0, []
-    for joint in sequence:
-        while open_joints and open_joints[-1] != parents[joint]:
-            open_joints.pop()
-            depth -= 1
-            lines.append(_tab(depth) + "}")
-        head = "ROOT " if joint == 0 else "JOINT "
-        lines.append(_tab(depth) + ("End Site" if joint in tips else head + names[joint]))
-        lines += [_tab(depth) + "{", _tab(depth + 1) + "OFFSET " + " ".join(f"{v:.6f}" for v in offsets[joint])]
-        if joint not in tips:
-            turns = [f"{axis}rotation" for axis in orders[joint]]
-            places = [f"{axis}position" for axis in "XYZ"] if joint == 0 or joint in moving else []
-            lines.append(_tab(depth + 1) + " ".join(["CHANNELS", str(len(places + turns)), *places, *turns]))
-            if joint not in with_children:
-                tab = _tab(depth + 1)
-                end = " ".join(f"{v:.6f}" for v in tip(offsets[joint], level=bool(low[joint])) + 0.0)
-                lines += [tab + "End Site", tab + "{", tab + f"\tOFFSET {end}", tab + "}"]
-        open_joints.append(joint)
-        depth += 1
-    lines += [_tab(d) + "}" for d in range(depth - 1, -1, -1)]
-    return lines
 
 
 def _tab(depth: int) -> str:
@@ -216,7 +215,8 @@ class _Angles:
         second[..., 1] = np.pi - first[..., 1]  # the other triple of angles of the same rotation
         stay = _distance(first[1:], first[:-1])
         change = _distance(first[1:], second[:-1])
-        turns = np.cumsum(np.concatenate([self.flipped[None], change < stay - 1e-9]), axis=0) % 2 == 1
+        flips = np.concatenate([self.flipped[None], change < stay - 1e-9])
+        turns = np.cumsum(flips, axis=0) % 2 == 1
         known = len(self.last)
         flipped = turns[known:] if known else turns
         chosen = np.where(flipped[..., None], second[known:], fresh)
@@ -227,3 +227,34 @@ class _Angles:
 
 def _distance(a: Array, b: Array) -> Array:
     return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi).sum(-1)
+
+
+# --- End Sites that say where a last bone ends --------------------------------------------------------------------
+
+
+def tip(offset: Array, *, level: bool) -> Array:
+    """(3,) the End Site of a joint with this offset: straight on, or ``level`` with the ground for a toe."""
+    length = float(np.linalg.norm(offset))
+    if length < SHORTEST:
+        return np.zeros(3)
+    ahead = offset * np.array([1.0, 0.0, 1.0]) if level else offset
+    if float(np.linalg.norm(ahead)) < 0.1 * length:
+        ahead = offset
+    return SHARE * length * ahead / float(np.linalg.norm(ahead))
+
+
+def is_tip(offset: Sequence[float], end: Sequence[float]) -> bool:
+    """Whether `tip` made the End Site ``end`` of a joint with this offset."""
+    bone, there = np.array(offset, dtype=np.float64), np.array(end, dtype=np.float64)
+    return float(np.linalg.norm(bone)) >= SHORTEST and any(
+        float(np.abs(tip(bone, level=level) - there).max()) < _SAME for level in (False, True)
+    )
+
+
+def low_joints(parents: Sequence[int], offsets: Array) -> NDArray[np.bool_]:
+    """(joints,) which joints are near the ground at rest: toes, whose tips must not point into it."""
+    heights = np.array(offsets[:, 1])
+    for j, parent in enumerate(parents[1:], start=1):
+        heights[j] += heights[parent]
+    low, high = float(heights.min()), float(heights.max())
+    return np.asarray(heights < low + 0.1 * (high - low))

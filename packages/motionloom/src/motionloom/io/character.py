@@ -10,7 +10,7 @@ import json
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +21,17 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.ground import GroundPose
 from motionloom.io.atomic import atomic_path
-from motionloom.io.glb import Document, pack_glb, read_document_chunks
-from motionloom.io.gltf_bind import on_floor
+from motionloom.io.glb import Document, accessor_of, add_channel, new_animation, pack_glb
 from motionloom.io.gltf_mesh import read_surfaces
-from motionloom.io.gltf_nodes import printable, upwards
-from motionloom.io.gltf_read import open_glb
-from motionloom.io.gltf_rig import Rig, parents_first, read_rig, worlds
+from motionloom.io.gltf_nodes import upwards
+from motionloom.io.gltf_read import read_rigs
+from motionloom.io.gltf_rig import Rig, on_floor, parents_first, worlds
+from motionloom.io.text import unique_names
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.joint_map import JointMap, Override
 from motionloom.retarget.joint_map import joint_map as find_joints
 from motionloom.retarget.stand import stand
-from motionloom.retarget.topology import ancestors, below
 
 Array = NDArray[np.float64]
 _SAME_TURN = 1e-7
@@ -45,14 +44,8 @@ class Character(Rig):
 
     path: Path
     joints: JointMap
-    kept: object = None
-    """What must stay as long as the character does: a folder with what its file became."""
-
-    @property
-    def suffixes(self) -> tuple[str, ...]:
-        """How the character's own file may end; a .vrm is a .glb of a special kind."""
-        own = self.path.suffix.lower()
-        return (own, ".glb") if own == ".vrm" else (own,)
+    suffixes: tuple[str, ...]
+    """How the character's own file may end; a .vrm is a .glb of a special kind."""
 
     @property
     def stand(self) -> GroundPose:
@@ -91,34 +84,29 @@ class Character(Rig):
         document = copy.deepcopy(self.file.document.json)
         new = _Insertion(document, self.file.document)
         animations = [] if replace else document.get("animations", [])
-        taken = set() if replace else set(self.file.clips)
+        names = unique_names((name or "motion" for _, name in clips), () if replace else self.file.clips)
         keys, inside = [self._keys(motion) for motion, _ in clips], set(self.nodes)
         moved = {(node, kind) for some in keys for node, kind, _ in some}
-        moved |= set() if replace else {key for channels in self.file.channels for key in channels if key[0] in inside}
-        for (motion, name), own in zip(clips, keys, strict=True):
-            name, numbers = name or "motion", count(2)
-            free = name
-            while free in taken:
-                free = f"{name}_{next(numbers)}"
-            taken.add(free)
+        if not replace:
+            animated = (key for channels in self.file.channels for key in channels)
+            moved |= {key for key in animated if key[0] in inside}
+        for (motion, _), name, own in zip(clips, names, keys, strict=True):
             # without its rest Blender and Godot leave a node where the animation that was shown before had it
             held = sorted(moved - {(node, kind) for node, kind, _ in own})
             still = [(node, kind, self.file.nodes[node].rest[kind][None]) for node, kind in held]
-            animation: dict[str, Any] = {"name": free, "channels": [], "samplers": [], "extras": {"fps": motion.fps}}
+            animation = new_animation(name, motion.fps)
             clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
             start = new.add(np.zeros((1, 1)), bounds=True) if held and len(motion) > 1 else clock
             for node, kind, values in own + still:
                 times = clock if len(values) == len(motion) else start
-                animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
-                channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": kind}}
-                animation["channels"].append(channel)
+                add_channel(animation, node, kind, times, new.add(values))
                 entry = document["nodes"][node]
                 if entry.pop("matrix", None) is not None:  # of an animated node it must not be (glTF 2.0, 3.6.1)
                     entry |= {part: rest.tolist() for part, rest in self.file.nodes[node].rest.items()}
             animations.append(animation)
         document["animations"] = animations
         with atomic_path(path) as temporary:
-            temporary.write_bytes(new.packed(self.path))
+            temporary.write_bytes(new.packed())
         return path
 
     def _keys(self, motion: Motion) -> list[tuple[int, str, Array]]:
@@ -130,21 +118,25 @@ class Character(Rig):
         parents, skeleton = self.file.parents, self.skeleton
         slots = {n: k for k, n in enumerate(self.nodes)}
         driven = {d for d in self.joints.drivers(skeleton) if d is not None}
-        above_driven = {a for d in driven for a in ancestors(skeleton, d)}
-        turned = set(np.flatnonzero((1 - np.abs(motion.rotations[..., 0]) > _SAME_TURN).any(axis=0)).tolist())
+        above_driven = {a for d in driven for a in skeleton.ancestors(d)}
+        moving = (1 - np.abs(motion.rotations[..., 0]) > _SAME_TURN).any(axis=0)
+        turned = set(np.flatnonzero(moving).tolist())
         free = {0, *(self.shifted & (driven | above_driven))}
         free |= {k for k, n in enumerate(self.nodes) if k and slots[parents[n]] != skeleton.parents[k]}
         if motion.translations is not None:
             apart = np.abs(motion.translations - skeleton.offsets).max(axis=(0, 2)) > 1e-5
             free |= set(np.flatnonzero(apart).tolist())
-        wanted, places = rot.multiply(motion.world_rotations(), self.turns), motion.positions()
+        wanted = rot.multiply(motion.world_rotations(), self.turns)
+        places = motion.positions()
         now = worlds(self.file, upwards(self.nodes[0], parents)[:0:-1], {})
         keys: list[tuple[int, str, Array]] = []
         for n in parents_first(frozenset(self.nodes), parents):
             k, node, p = slots[n], self.file.nodes[n], parents[n]
             turn, place = wanted[:, k], places[:, k]
             if p >= 0:
-                back, linear, place = rot.inverse(now.turns[p]), now.linear[p], place - now.places[p]
+                back = rot.inverse(now.turns[p])
+                linear = now.linear[p]
+                place = place - now.places[p]
                 turn = rot.multiply(back, turn)
                 if linear is None:
                     place = rot.rotate(back, place)
@@ -170,49 +162,37 @@ def load_character(path: str | Path, *, joint_map: Override | None = None) -> Ch
     ``joint_map`` says which joints are which where names do not, as in `motionloom.retarget.joint_map`.
     """
     path = Path(path)
-    file = open_glb(path)
+    own = path.suffix.lower()
     problem: MotionloomError | None = None
-    for person in range(len(file.people)):
-        rig = read_rig(file, person, {})
+    for rig in read_rigs(path):
         try:
-            found = find_joints(rig.skeleton, joint_map)
+            joints = find_joints(rig.skeleton, joint_map)
         except MotionloomError as error:
             problem = problem or error
         else:
-            character = Character(rig.file, rig.skeleton, rig.nodes, rig.turns, rig.shifted, path, found)
-            _remark_on_what_stays(character)
-            return _with_soles(character)
+            _remark_on_what_stays(path, len(rig.file.people), rig.skeleton.names[0], rig.file.loose)
+            suffixes = (own, ".glb") if own == ".vrm" else (own,)
+            return _with_soles(Character(**vars(rig), path=path, joints=joints, suffixes=suffixes))
     assert problem is not None
     raise MotionloomError(f"{path}: {problem}")
 
 
-def _remark_on_what_stays(character: Character) -> None:
-    """Say which skeletons and meshes of the file do not move with the character."""
-    file = character.file
-    if len(file.people) > 1:
+def _remark_on_what_stays(path: Path, people: int, root: str, loose: list[str]) -> None:
+    """Say which skeletons and meshes of the file do not move with the one that has this ``root``."""
+    if people > 1:
         warnings.warn(
-            f"{character.path} holds {len(file.people)} skeletons; the one of {character.skeleton.names[0]!r} moves, "
-            "the others stay as they are",
-            stacklevel=3,
+            f"{path} holds {people} skeletons; the one of {root!r} moves, the others stay as they are", stacklevel=3
         )
-    carriers = frozenset().union(*file.people)
-    loose = [
-        printable(entry.get("name")) or f"node_{number}"
-        for number, entry in enumerate(file.document.items("nodes"))
-        if entry.get("mesh") is not None
-        and entry.get("skin") is None
-        and carriers.isdisjoint(upwards(number, file.parents))
-    ]
     if loose:
         more = f" and {len(loose) - 5} more" if len(loose) > 5 else ""
         warnings.warn(
-            f"{character.path}: {', '.join(map(repr, loose[:5]))}{more} hang on no bone and stay where they are while "
+            f"{path}: {', '.join(map(repr, loose[:5]))}{more} hang on no bone and stay where they are while "
             "the character moves; parent them to a bone in the program that made them",
             stacklevel=3,
         )
 
 
-_DOWN = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, -0.4, 0) for z in (-1, 0, 1) if x or y or z])
+_DOWN = np.array([way for way in product((-1, 0, 1), (-1, -0.4, 0), (-1, 0, 1)) if any(way)])
 """Directions in which the corners of a foot are looked for."""
 
 
@@ -226,13 +206,14 @@ def _with_soles(character: Character) -> Character:
         if meshes:
             _remark_on_soles(character, "does not stand on the floor at rest")
         return character
-    feet = {skeleton.index(name) for j in (7, 8, 10, 11) for name, weight in character.joints.points[j] if weight}
-    feet = below(skeleton, feet)
+    parts = (character.joints.points[j] for j in (7, 8, 10, 11))
+    feet = [skeleton.index(name) for part in parts for name, weight in part if weight]
     down = rot.rotate(rot.shortest_arc(np.array([0.0, 1.0, 0.0]), up), _DOWN)
     meshed = read_surfaces(character)
     points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in meshed]
-    for j in sorted(feet):
-        own = np.concatenate([places[of == j] for places, of in points] or [np.zeros((0, 3))]) - rest[j]
+    for j in skeleton.below(*feet):
+        below = [places[of == j] for places, of in points]
+        own = np.concatenate([np.zeros((0, 3)), *below]) - rest[j]
         if len(own):
             found[j] = own[np.unique((own @ down.T).argmax(axis=0))]
     if meshes and not points:
@@ -256,37 +237,28 @@ class _Insertion:
     def add(self, values: Array, *, bounds: bool = False) -> int:
         """The number of the accessor of values (count, width)."""
         array = np.ascontiguousarray(values, dtype="<f4")
-        kind = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[array.shape[1]]
-        accessor: dict[str, Any] = {
-            "bufferView": self.view,
-            "byteOffset": len(self.data),
-            "componentType": 5126,
-            "count": len(array),
-            "type": kind,
-        }
-        if bounds:
-            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        where = {"bufferView": self.view, "byteOffset": len(self.data)}
+        ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
         self.data += array.tobytes()
-        self.accessors.append(accessor)
+        self.accessors.append(accessor_of(array.dtype, array.shape, where) | ends)
         return len(self.accessors) - 1
 
-    def packed(self, path: Path) -> bytes:
+    def packed(self) -> bytes:
         """The whole file."""
         buffers: list[Any] = self.document.setdefault("buffers", [])
-        view = {"byteLength": len(self.data)}
-        chunks = read_document_chunks(path)
-        if chunks is not None and (not buffers or "uri" not in buffers[0]):
+        size, binary = {"byteLength": len(self.data)}, self.file.binary or b""
+        if self.file.packed and (not buffers or "uri" not in buffers[0]):
             if not buffers:
                 buffers.append({"byteLength": 0})
-            old = chunks.binary[: buffers[0]["byteLength"]]
-            start = len(old) + -len(old) % 4
-            binary = old + bytes(start - len(old)) + bytes(self.data)
+            binary = binary[: buffers[0]["byteLength"]]
+            binary += bytes(-len(binary) % 4)
+            self.document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary)} | size)
+            binary += self.data
             buffers[0]["byteLength"] = len(binary)
-            self.document["bufferViews"].append({"buffer": 0, "byteOffset": start} | view)
-            return pack_glb(self.document, binary, chunks.others)
-        uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
-        buffers.append({"byteLength": len(self.data), "uri": uri})
-        self.document["bufferViews"].append({"buffer": len(buffers) - 1} | view)
-        if chunks is not None:
-            return pack_glb(self.document, chunks.binary, chunks.others)
+        else:
+            uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+            buffers.append(size | {"uri": uri})
+            self.document["bufferViews"].append({"buffer": len(buffers) - 1} | size)
+        if self.file.packed:
+            return pack_glb(self.document, binary, self.file.others)
         return json.dumps(self.document, allow_nan=False).encode()

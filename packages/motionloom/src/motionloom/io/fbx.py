@@ -2,8 +2,8 @@
 
 import tempfile
 import warnings
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
@@ -19,27 +19,29 @@ def load_fbx(path: Path, *, clip: int | str | None = None) -> Motion:
 
     Raises `MotionloomError` as that does, and where there is no Blender or it cannot read the file.
     """
+    with _glb_of(path) as made:
+        return load_glb(made, clip=clip)
+
+
+def load_fbx_character(path: Path, *, joint_map: Override | None = None) -> Character:
+    """Read the humanoid of an FBX; errors as of `load_fbx`."""
+    with _glb_of(path) as made:
+        return load_character(made, joint_map=joint_map)
+
+
+@contextmanager
+def _glb_of(path: Path) -> Iterator[Path]:
+    """The GLB that Blender makes of an FBX; errors and warnings of the block name the FBX."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         made = fbx_to_glb(path, Path(folder))
         try:
-            motion = load_glb(made, clip=clip)
+            yield made
         except MotionloomError as error:
             raise MotionloomError(str(error).replace(str(made), str(path))) from None
     for one in said:
         if issubclass(one.category, UserWarning):
-            warnings.warn(str(one.message).replace(str(made), str(path)), stacklevel=2)
-    return motion
-
-
-def load_fbx_character(path: Path, *, joint_map: Override | None = None) -> Character:
-    """Read the humanoid of an FBX; errors as of `load_fbx`. What Blender made of it is there as long as it is."""
-    folder = tempfile.TemporaryDirectory()
-    made = fbx_to_glb(path, Path(folder.name))
-    try:
-        return replace(load_character(made, joint_map=joint_map), kept=folder)
-    except MotionloomError as error:
-        raise MotionloomError(str(error).replace(str(made), str(path))) from None
+            warnings.warn(str(one.message).replace(str(made), str(path)), stacklevel=4)
 
 
 def save_fbx(motions: Sequence[Motion], path: Path, *, names: Sequence[str] | None = None) -> Path:
@@ -48,4 +50,5 @@ def save_fbx(motions: Sequence[Motion], path: Path, *, names: Sequence[str] | No
     Raises `MotionloomError` as `save_glb` does, and where there is no Blender or it fails.
     """
     with tempfile.TemporaryDirectory() as folder:
-        return glb_to_fbx(save_glb(motions, Path(folder) / "motion.glb", names=names), path, fps=motions[0].fps)
+        made = save_glb(motions, Path(folder) / "motion.glb", names=names)
+        return glb_to_fbx(made, path, fps=motions[0].fps)

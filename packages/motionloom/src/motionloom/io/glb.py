@@ -4,7 +4,6 @@ import base64
 import binascii
 import json
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,6 +31,12 @@ class Document:
     """For messages."""
     json: dict[str, Any]
     buffers: tuple[bytes, ...]
+    binary: bytes | None = None
+    """The binary part of a GLB; None where there is none."""
+    others: bytes = b""
+    """The other parts of a GLB, whole with their heads."""
+    packed: bool = False
+    """Whether it is a GLB and no .gltf."""
     _checked: dict[str, list[dict[str, Any]]] = field(default_factory=dict, compare=False)
     """Lists of the JSON that were found to be lists of objects: they are asked for again and again."""
 
@@ -106,7 +111,8 @@ class Document:
                 "(gltfpack: without -c)"
             )
         data = self.buffers[self.index(view.get("buffer"), len(self.buffers), "buffers")]
-        start, length = self._size(view, "byteOffset", what), self._size(view, "byteLength", what)
+        start = self._size(view, "byteOffset", what)
+        length = self._size(view, "byteLength", what)
         row = dtype.itemsize * shape[1]
         stride = self._size(view, "byteStride", what) or row
         offset = self._size(accessor, "byteOffset", what)
@@ -128,9 +134,9 @@ class Document:
 def read_document(path: str | Path) -> Document:
     """Read a .glb, or a .gltf whose buffers are embedded; raises `MotionloomError` for anything else."""
     data, name = read_bytes(path), str(path)
-    binary: bytes | None = None
-    if data[:4] == b"glTF":
-        data, binary = _chunks(data, name)
+    binary, others, packed = None, b"", data[:4] == b"glTF"
+    if packed:
+        data, binary, others = _chunks(data, name)
     if len(data) > MAX_JSON:
         raise MotionloomError(f"{name} has {len(data) / 1e6:.0f} MB of JSON; at most {MAX_JSON / 1e6:.0f} MB are read")
     try:
@@ -145,7 +151,7 @@ def read_document(path: str | Path) -> Document:
     if not isinstance(version, str) or not version.startswith("2."):
         raise document.bad(f"it declares version {shown(str(version))}; only glTF 2.x is read")
     buffers = [_buffer(document, i, entry, binary) for i, entry in enumerate(document.items("buffers"))]
-    return Document(name, content, tuple(buffers))
+    return Document(name, content, tuple(buffers), binary, others, packed)
 
 
 def compressed(owner: dict[str, Any]) -> bool:
@@ -156,42 +162,37 @@ def compressed(owner: dict[str, Any]) -> bool:
     )
 
 
-@dataclass(frozen=True)
-class Chunks:
-    """What a GLB holds beside its JSON."""
-
-    binary: bytes
-    others: tuple[tuple[bytes, bytes], ...]
-    """Kind and content of chunks that are neither JSON nor binary."""
-
-
-def read_document_chunks(path: str | Path) -> Chunks | None:
-    """The binary parts of a .glb; None for a .gltf."""
-    data = read_bytes(path)
-    if data[:4] != b"glTF":
-        return None
-    found, at = [], 12
-    while at + 8 <= len(data):
-        length = struct.unpack_from("<I", data, at)[0]
-        found.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + length]))
-        at += 8 + length
-    binary = next((content for kind, content in found if kind == b"BIN\0"), b"")
-    return Chunks(binary, tuple(chunk for chunk in found if chunk[0] not in (b"JSON", b"BIN\0")))
-
-
-def pack_glb(content: dict[str, Any], binary: bytes, others: Sequence[tuple[bytes, bytes]] = ()) -> bytes:
-    """A GLB of a JSON part, a binary part and further chunks."""
+def pack_glb(content: dict[str, Any], binary: bytes, others: bytes = b"") -> bytes:
+    """A GLB of a JSON part, a binary part and further chunks, whole with their heads."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
     parts = [(b"JSON", text + b" " * (-len(text) % 4))]
     if binary:
         parts.append((b"BIN\0", binary + bytes(-len(binary) % 4)))
-    parts += others
-    body = b"".join(struct.pack("<I", len(part)) + kind + part for kind, part in parts)
+    body = b"".join(struct.pack("<I", len(part)) + kind + part for kind, part in parts) + others
     return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
 
 
-def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
-    """JSON and binary chunk of a GLB."""
+def accessor_of(dtype: np.dtype, shape: tuple[int, ...], where: dict[str, int]) -> dict[str, Any]:
+    """The JSON of an accessor of numbers of a shape (count, width) that are ``where`` its keys say."""
+    component = next(number for number, kind in _KINDS.items() if dtype == kind)
+    kind = next(name for name, width in _WIDTHS.items() if width == shape[1])
+    return where | {"componentType": component, "count": shape[0], "type": kind}
+
+
+def new_animation(name: str, fps: float) -> dict[str, Any]:
+    """The JSON of an animation without channels, which states its frame rate."""
+    return {"name": name, "channels": [], "samplers": [], "extras": {"fps": fps}}
+
+
+def add_channel(animation: dict[str, Any], node: int, path: str, clock: int, values: int) -> None:
+    """Let an animation move a node: ``clock`` and ``values`` are the accessors of its keys."""
+    samplers = animation["samplers"]
+    samplers.append({"input": clock, "output": values, "interpolation": "LINEAR"})
+    animation["channels"].append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
+
+
+def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None, bytes]:
+    """The JSON of a GLB, its binary chunk, and all other chunks, whole with their heads."""
     if len(data) < 20:
         raise MotionloomError(f"{name} is cut short: a GLB has at least 20 bytes, it has {len(data)}")
     version, total = struct.unpack_from("<II", data, 4)
@@ -199,20 +200,21 @@ def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
         raise MotionloomError(f"{name} is GLB version {version}; only version 2 is read")
     if total > len(data):
         raise MotionloomError(f"{name} is cut short: it declares {total} bytes and has {len(data)}")
-    chunks: dict[bytes, bytes] = {}
-    at = 12
+    main: dict[bytes, bytes] = {}
+    others, at = bytearray(), 12
     while at + 8 <= total:
-        length = struct.unpack_from("<I", data, at)[0]
-        kind = data[at + 4 : at + 8]
-        if at + 8 + length > total:
+        length, kind = struct.unpack_from("<I4s", data, at)
+        end = at + 8 + length
+        if end > total:
             raise MotionloomError(f"{name} is damaged: a part of {length} bytes reaches beyond the file's end")
-        chunks.setdefault(kind, data[at + 8 : at + 8 + length])
-        at += 8 + length
-        if len(chunks) > 16:
-            break
-    if b"JSON" not in chunks:
+        if kind in (b"JSON", b"BIN\0"):
+            main.setdefault(kind, data[at + 8 : end])
+        else:
+            others += data[at:end]
+        at = end
+    if b"JSON" not in main:
         raise MotionloomError(f"{name} is damaged: it has no JSON part")
-    return chunks[b"JSON"], chunks.get(b"BIN\0")
+    return main[b"JSON"], main.get(b"BIN\0"), bytes(others)
 
 
 def _buffer(document: Document, number: int, entry: dict[str, Any], binary: bytes | None) -> bytes:

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.io import body as bodies
 from motionloom.io.atomic import atomic_path
-from motionloom.io.body import MATERIALS, Piece, body
-from motionloom.io.glb import pack_glb
+from motionloom.io.body import MATERIALS, Piece, check_people
+from motionloom.io.glb import accessor_of, add_channel, new_animation, pack_glb
 from motionloom.io.gltf_read import load_glb, load_glb_people
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
@@ -24,9 +24,7 @@ from motionloom.skeleton import Skeleton
 __all__ = ["load_glb", "load_glb_people", "save_glb"]
 
 Array = NDArray[np.float64]
-_FLOAT, _U8, _U16, _U32 = 5126, 5121, 5123, 5125
-_NUMPY = {_FLOAT: "<f4", _U8: "<u1", _U16: "<u2", _U32: "<u4"}
-_TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+_LISTS = ("nodes", "skins", "meshes", "materials", "accessors", "bufferViews")
 _VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
 
 
@@ -36,26 +34,27 @@ class _File:
     def __init__(self, fps: float) -> None:
         self.data = bytearray()
         self.scene: list[int] = []
-        self.animation: dict[str, Any] = {"name": "motion", "channels": [], "samplers": [], "extras": {"fps": fps}}
-        self.lists: dict[str, list[dict[str, Any]]] = {
-            part: [] for part in ("nodes", "skins", "meshes", "materials", "accessors", "bufferViews")
-        }
+        self.animation = new_animation("motion", fps)
+        self.lists: dict[str, list[dict[str, Any]]] = {part: [] for part in _LISTS}
 
     def append(self, part: str, entry: dict[str, Any]) -> int:
         """Append to a list of the document; gives the entry's number."""
         self.lists[part].append(entry)
         return len(self.lists[part]) - 1
 
-    def add(self, values: np.ndarray, kind: int, *, target: int | None = None, bounds: bool = False) -> int:
+    def add(self, values: np.ndarray, kind: str = "<f4", *, target: int | None = None, bounds: bool = False) -> int:
         """Append an array (count, width) and describe it; gives the accessor's number."""
-        array = np.ascontiguousarray(values, dtype=_NUMPY[kind]).reshape(len(values), -1)
+        array = np.ascontiguousarray(values, dtype=kind).reshape(len(values), -1)
         self.data.extend(bytes(-len(self.data) % 4))
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
         number = self.append("bufferViews", view | ({} if target is None else {"target": target}))
         self.data.extend(array.tobytes())
         ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
-        about = {"bufferView": number, "componentType": kind, "count": len(array), "type": _TYPES[array.shape[1]]}
-        return self.append("accessors", about | ends)
+        return self.append("accessors", accessor_of(array.dtype, array.shape, {"bufferView": number}) | ends)
+
+    def key(self, node: int, path: str, clock: int, values: np.ndarray) -> None:
+        """Let the animation move a node at the times of the accessor ``clock``."""
+        add_channel(self.animation, node, path, clock, self.add(values))
 
     def packed(self) -> bytes:
         """The whole file."""
@@ -67,7 +66,8 @@ class _File:
             "animations": [self.animation],
             "buffers": [{"byteLength": len(self.data)}],
         }
-        return pack_glb(document | {part: entries for part, entries in self.lists.items() if entries}, bytes(self.data))
+        lists = {part: entries for part, entries in self.lists.items() if entries}
+        return pack_glb(document | lists, bytes(self.data))
 
 
 def save_glb(
@@ -81,10 +81,7 @@ def save_glb(
     for the root and, where a motion has `Motion.translations`, for every joint.
     Errors: no motions, names of another count, or a path that cannot be written.
     """
-    if not motions:
-        raise MotionloomError("there is no motion to save; give at least one")
-    if names is not None and len(names) != len(motions):
-        raise MotionloomError(f"{len(motions)} motions need as many names; got {len(names)}")
+    check_people(motions, names)
     with atomic_path(path) as temp:
         temp.write_bytes(glb_bytes(motions, body=body, names=names))
     return Path(path)
@@ -92,10 +89,6 @@ def save_glb(
 
 def glb_bytes(motions: Sequence[Motion], *, body: bool = True, names: Sequence[str] | None = None) -> bytes:
     """What `save_glb` writes."""
-    return _assemble(motions, body, names)
-
-
-def _assemble(motions: Sequence[Motion], with_body: bool, names: Sequence[str] | None) -> bytes:
     file = _File(motions[0].fps)
     clocks: dict[tuple[float, int], int] = {}
     for number, motion in enumerate(motions):
@@ -107,9 +100,9 @@ def _assemble(motions: Sequence[Motion], with_body: bool, names: Sequence[str] |
         _add_nodes(file, motion.skeleton, first)
         clock = (motion.fps, len(motion))
         if clock not in clocks:
-            clocks[clock] = file.add(np.arange(len(motion))[:, None] / motion.fps, _FLOAT, bounds=True)
+            clocks[clock] = file.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
         _animate(file, motion, first=first, clock=clocks[clock])
-        if with_body:
+        if body:
             file.scene += _dress(file, motion, first, name=f"body{tail}")
     return file.packed()
 
@@ -118,44 +111,34 @@ def _add_nodes(file: _File, skeleton: Skeleton, first: int) -> None:
     for j, name in enumerate(skeleton.names):
         children = [first + c for c in skeleton.children(j)]
         place = skeleton.offsets[j].astype("f4").astype(float).tolist()
-        file.append("nodes", {"name": name, "translation": place} | ({"children": children} if children else {}))
+        below = {"children": children} if children else {}
+        file.append("nodes", {"name": name, "translation": place} | below)
 
 
 def _animate(file: _File, motion: Motion, *, first: int, clock: int) -> None:
     turns = np.roll(rot.unroll(rot.normalize(motion.rotations)), -1, axis=-1)
     for j in range(len(motion.skeleton)):
         if j not in motion.skeleton.ends:
-            _channel(file, first + j, "rotation", clock, file.add(turns[:, j], _FLOAT))
+            file.key(first + j, "rotation", clock, turns[:, j])
         if j == 0:
-            _channel(file, first, "translation", clock, file.add(motion.root, _FLOAT))
+            file.key(first, "translation", clock, motion.root)
         elif motion.translations is not None:
-            _channel(file, first + j, "translation", clock, file.add(motion.translations[:, j], _FLOAT))
-
-
-def _channel(file: _File, node: int, path: str, clock: int, values: int) -> None:
-    samplers = file.animation["samplers"]
-    samplers.append({"input": clock, "output": values, "interpolation": "LINEAR"})
-    file.animation["channels"].append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
+            file.key(first + j, "translation", clock, motion.translations[:, j])
 
 
 def _dress(file: _File, motion: Motion, first: int, name: str) -> list[int]:
     """Add a skin and a skinned mesh; gives its node, which belongs at the top of the scene (glTF 2.0, 3.7.3.3)."""
-    pieces = body(motion)
+    pieces = bodies.body(motion)
     if not pieces:
         return []
     skeleton = motion.skeleton
     rest = skeleton.rest_positions()
     binds = np.tile(np.eye(4), (len(skeleton), 1, 1))
     binds[:, 3, :3] = -rest  # column-major: the last column lies in the last row
-    skin = file.append(
-        "skins",
-        {
-            "name": name,
-            "joints": list(range(first, first + len(skeleton))),
-            "skeleton": first,
-            "inverseBindMatrices": file.add(binds.reshape(-1, 16), _FLOAT),
-        },
-    )
+    joints = list(range(first, first + len(skeleton)))
+    matrices = file.add(binds.reshape(-1, 16))
+    about = {"name": name, "joints": joints, "skeleton": first, "inverseBindMatrices": matrices}
+    skin = file.append("skins", about)
     sides = sorted({p.side for p in pieces})
     primitives = [_primitive(file, [p for p in pieces if p.side == side], rest, side) for side in sides]
     mesh = file.append("meshes", {"name": name, "primitives": primitives})
@@ -170,13 +153,12 @@ def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> dict
     joints[:, 0] = np.repeat([p.joint for p in pieces], [len(p.points) for p in pieces])
     weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
     attributes = {
-        "POSITION": file.add(points, _FLOAT, target=_VERTICES, bounds=True),
-        "NORMAL": file.add(np.concatenate([p.normals for p in pieces]), _FLOAT, target=_VERTICES),
-        "JOINTS_0": file.add(joints, _U8 if len(rest) <= 256 else _U16, target=_VERTICES),
-        "WEIGHTS_0": file.add(weights, _FLOAT, target=_VERTICES),
+        "POSITION": file.add(points, target=_VERTICES, bounds=True),
+        "NORMAL": file.add(np.concatenate([p.normals for p in pieces]), target=_VERTICES),
+        "JOINTS_0": file.add(joints, "<u1" if len(rest) <= 256 else "<u2", target=_VERTICES),
+        "WEIGHTS_0": file.add(weights, target=_VERTICES),
     }
-    kind = _U16 if len(points) < 65535 else _U32
-    faces = file.add(indices[:, None], kind, target=_INDICES)
+    faces = file.add(indices[:, None], "<u2" if len(points) < 65535 else "<u4", target=_INDICES)
     return {"attributes": attributes, "indices": faces, "material": _material(file, side)}
 
 

@@ -67,20 +67,15 @@ def read_curves(document: Document, samplers: dict[tuple[int, str], dict[str, An
     for (node, path), sampler in samplers.items():
         key = document.index(sampler.get("input"), len(document.items("accessors")), "accessors")
         if key not in clocks:
-            clocks[key] = _times(document, key)
-            held += clocks[key].size
+            times = clocks[key] = document.accessor(key, "SCALAR", "an animation's key times")[:, 0]
+            if not (np.diff(times) > 0).all() or np.abs(times).max() > 1e7:
+                raise document.bad("an animation's key times do not rise")
+            held += times.size
         curve = curves[node, path] = _curve(document, sampler, clocks[key], f"the {path} of node {node}")
         held += curve.values.size
         if held > most:
             raise document.bad("its animation claims more numbers than the file holds")
     return curves
-
-
-def _times(document: Document, key: Any) -> Array:
-    times = document.accessor(key, "SCALAR", "an animation's key times")[:, 0]
-    if not (np.diff(times) > 0).all() or np.abs(times).max() > 1e7:
-        raise document.bad("an animation's key times do not rise")
-    return times
 
 
 def _curve(document: Document, sampler: dict[str, Any], times: Array, what: str) -> Curve:
@@ -144,7 +139,8 @@ def _rate(times: Array, declared: float | None) -> float:
     fps = 1 / step
     if not 10 * 0.99 < fps < FPS_LIMIT * 1.01:
         return FALLBACK_FPS
-    common = [c for c in (24000 / 1001, 30000 / 1001, 60000 / 1001, round(fps)) if abs(fps / c - 1) < 3e-4]
+    rates = (24000 / 1001, 30000 / 1001, 60000 / 1001, round(fps))
+    common = [c for c in rates if abs(fps / c - 1) < 3e-4]
     return float(min(common, key=lambda c: abs(fps - c))) if common else fps
 
 

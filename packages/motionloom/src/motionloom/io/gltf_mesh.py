@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document
-from motionloom.io.gltf_bind import transform, world_from_nodes
-from motionloom.io.gltf_nodes import printable, upwards
-from motionloom.io.gltf_rig import Rig, worlds
+from motionloom.io.gltf_nodes import printable
+from motionloom.io.gltf_rig import Rig
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -50,16 +49,11 @@ def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
     ``remark``: with a warning.
     Raises `MotionloomError` for a file that declares more than memory should hold.
     """
-    file, document, known = rig.file, rig.file.document, dict[int, Array]()
-    linear = worlds(file, [*upwards(rig.nodes[0], file.parents)[:0:-1], *rig.nodes], {}).linear
-    for n, place, turn in zip(rig.nodes, rig.skeleton.rest_positions(), rig.turns, strict=True):
-        whole = linear[n]
-        size = 1.0 if whole is None else float(np.cbrt(np.linalg.det(whole[0])))
-        known[n] = transform(place, turn, np.full(3, size))
+    file, document = rig.file, rig.file.document
     joints: dict[int, int | None] = {n: k for k, n in enumerate(rig.nodes)}
     for n in file.order:
         joints.setdefault(n, joints.get(file.parents[n]))
-    rest = {n: (joints[n], matrix) for n, matrix in world_from_nodes(file, file.order, known).items()}
+    rest = {n: (joints[n], matrix) for n, matrix in rig.rest.items()}
     found: list[Surface] = []
     pieces = vertices = unread = 0
     for number, entry in enumerate(document.items("nodes")):
@@ -70,7 +64,7 @@ def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
         for piece in document.items("primitives", mesh):
             pieces += 1
             try:
-                surface = _surface(document, entry, number, piece, rest)
+                surface = _Wearer(document, rest, number, entry).surface(piece)
             except MotionloomError:
                 unread += 1
                 continue  # compressed, sparse or damaged: what moves does not depend on it
@@ -87,74 +81,83 @@ def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
     return found
 
 
-def _surface(
-    document: Document, entry: dict[str, Any], number: int, piece: dict[str, Any], rest: Rest
-) -> Surface | None:
-    attributes = piece.get("attributes")
-    if not isinstance(attributes, dict) or piece.get("mode", 4) != 4:
-        return None
-    points = document.accessor(attributes.get("POSITION"), "VEC3", "the places of a mesh")
-    if len(points) > MAX_VERTICES:
-        raise document.bad(f"a mesh has {len(points):,} vertices")
-    carried = _influences(document, entry, number, attributes, len(points), rest)
-    if carried is None:
-        return None
-    joints, weights, moves = carried
-    blend = np.einsum("vk,vkab->vab", weights, moves)
-    normals = _optional(document, attributes.get("NORMAL"), "VEC3", len(points))
-    if normals is not None:
-        normals = np.einsum("vab,vb->va", blend[:, :3, :3], normals)
-        normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
-    return Surface(
-        printable(entry.get("name")) or f"mesh_{number}",
-        np.einsum("vab,vb->va", blend[:, :3, :3], points) + blend[:, :3, 3],
-        normals,
-        _optional(document, attributes.get("TEXCOORD_0"), "VEC2", len(points)),
-        _triangles(document, piece.get("indices"), len(points)),
-        joints,
-        weights,
-        _colour(document, piece.get("material")),
-    )
+@dataclass(frozen=True)
+class _Wearer:
+    """A node that has a mesh."""
+
+    document: Document
+    rest: Rest
+    number: int
+    entry: dict[str, Any]
+
+    def surface(self, piece: dict[str, Any]) -> Surface | None:
+        """A piece of its mesh; None for what is no triangles, or hangs on nobody."""
+        document = self.document
+        attributes = piece.get("attributes")
+        if not isinstance(attributes, dict) or piece.get("mode", 4) != 4:
+            return None
+        points = document.accessor(attributes.get("POSITION"), "VEC3", "the places of a mesh")
+        if len(points) > MAX_VERTICES:
+            raise document.bad(f"a mesh has {len(points):,} vertices")
+        carried = self.influences(attributes, len(points))
+        if carried is None:
+            return None
+        joints, weights, moves = carried
+        blend = np.einsum("vk,vkab->vab", weights, moves)
+        normals = _optional(document, attributes.get("NORMAL"), "VEC3", len(points))
+        if normals is not None:
+            normals = np.einsum("vab,vb->va", blend[:, :3, :3], normals)
+            normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+        return Surface(
+            printable(self.entry.get("name")) or f"mesh_{self.number}",
+            np.einsum("vab,vb->va", blend[:, :3, :3], points) + blend[:, :3, 3],
+            normals,
+            _optional(document, attributes.get("TEXCOORD_0"), "VEC2", len(points)),
+            _triangles(document, piece.get("indices"), len(points)),
+            joints,
+            weights,
+            _colour(document, piece.get("material")),
+        )
+
+    def influences(self, attributes: dict[str, Any], count: int) -> tuple[Whole, Array, Array] | None:
+        """Joints, weights (vertices, k), and world_from_mesh at rest (vertices, k, 4, 4) as each joint carries it."""
+        document, rest = self.document, self.rest
+        if self.entry.get("skin") is None:
+            joint, matrix = rest[self.number]
+            if joint is None:
+                return None
+            moves = np.broadcast_to(matrix, (count, 1, 4, 4))
+            return np.full((count, 1), joint), np.ones((count, 1)), moves
+        skins = document.items("skins")
+        skin = skins[document.index(self.entry["skin"], len(skins), "skins")]
+        listed = [document.index(n, len(rest), "nodes") for n in skin.get("joints", [])]
+        carriers = [rest[n][0] for n in listed]
+        if not listed or None in carriers:
+            return None
+        binds = np.tile(np.eye(4), (len(listed), 1, 1))
+        if skin.get("inverseBindMatrices") is not None:
+            flat = document.accessor(skin["inverseBindMatrices"], "MAT4", "inverse bind matrices")
+            binds = flat.reshape(-1, 4, 4).transpose(0, 2, 1)[: len(listed)]
+            if len(binds) < len(listed):
+                raise document.bad(f"a skin has {len(listed)} joints and {len(binds)} inverse bind matrices")
+        moves = np.array([rest[n][1] @ bind for n, bind in zip(listed, binds, strict=True)])
+        sets = [k for k in range(8) if f"JOINTS_{k}" in attributes]
+        which = [document.accessor(attributes[f"JOINTS_{k}"], "VEC4", "the joints of a mesh") for k in sets]
+        shares = [document.accessor(attributes.get(f"WEIGHTS_{k}"), "VEC4", "the weights of a mesh") for k in sets]
+        if not sets or any(len(part) != count for part in (*which, *shares)):
+            return None
+        numbers = np.concatenate(which, axis=1).astype(np.int64)
+        weights = np.concatenate(shares, axis=1)
+        total = weights.sum(axis=1, keepdims=True)
+        if numbers.max() >= len(listed) or not (total > 0).all():
+            return None
+        joints = np.array(carriers, dtype=np.int64)[numbers]
+        return joints, weights / total, moves[numbers]
 
 
 def _optional(document: Document, number: Any, kind: str, count: int) -> Array | None:
     values = None if number is None else document.accessor(number, kind, "a mesh's attributes")
     return values if values is not None and len(values) == count else None
-
-
-def _influences(
-    document: Document, entry: dict[str, Any], number: int, attributes: dict[str, Any], count: int, rest: Rest
-) -> tuple[Whole, Array, Array] | None:
-    """Joints and weights (vertices, k), and world_from_mesh at rest (vertices, k, 4, 4) as each of them carries it."""
-    if entry.get("skin") is None:
-        joint, matrix = rest[number]
-        if joint is None:
-            return None
-        moves = np.broadcast_to(matrix, (count, 1, 4, 4))
-        return np.full((count, 1), joint), np.ones((count, 1)), moves
-    skins = document.items("skins")
-    skin = skins[document.index(entry["skin"], len(skins), "skins")]
-    listed = [document.index(n, len(rest), "nodes") for n in skin.get("joints", [])]
-    carriers = [rest[n][0] for n in listed]
-    if not listed or None in carriers:
-        return None
-    binds = np.tile(np.eye(4), (len(listed), 1, 1))
-    if skin.get("inverseBindMatrices") is not None:
-        flat = document.accessor(skin["inverseBindMatrices"], "MAT4", "inverse bind matrices")
-        binds = flat.reshape(-1, 4, 4).transpose(0, 2, 1)[: len(listed)]
-        if len(binds) < len(listed):
-            raise document.bad(f"a skin has {len(listed)} joints and {len(binds)} inverse bind matrices")
-    moves = np.array([rest[n][1] @ bind for n, bind in zip(listed, binds, strict=True)])
-    sets = [k for k in range(8) if f"JOINTS_{k}" in attributes]
-    which = [document.accessor(attributes[f"JOINTS_{k}"], "VEC4", "the joints of a mesh") for k in sets]
-    shares = [document.accessor(attributes.get(f"WEIGHTS_{k}"), "VEC4", "the weights of a mesh") for k in sets]
-    if not sets or any(len(part) != count for part in (*which, *shares)):
-        return None
-    numbers, weights = np.concatenate(which, axis=1).astype(np.int64), np.concatenate(shares, axis=1)
-    total = weights.sum(axis=1, keepdims=True)
-    if numbers.max() >= len(listed) or not (total > 0).all():
-        return None
-    return np.array(carriers, dtype=np.int64)[numbers], weights / total, moves[numbers]
 
 
 def _triangles(document: Document, number: Any, count: int) -> Whole:
@@ -174,4 +177,6 @@ def _colour(document: Document, number: Any) -> tuple[float, ...]:
     factor = surface.get("baseColorFactor") if isinstance(surface, dict) else None
     if isinstance(surface, dict) and surface.get("baseColorTexture") is not None and factor is None:
         return GREY
-    return tuple(document.numbers(factor, 4, "a colour")[:3].clip(0, 1).tolist()) if factor is not None else GREY
+    if factor is not None:
+        return tuple(document.numbers(factor, 4, "a colour")[:3].clip(0, 1).tolist())
+    return GREY

@@ -1,7 +1,7 @@
 """The nodes of a glTF file: their names, their tree and their transforms at rest."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
@@ -17,6 +17,14 @@ Array = NDArray[np.float64]
 MAX_NODES = 20_000
 
 
+def transform(place: Array, turn: Array, scale: Array) -> Array:
+    """(4, 4) of its parts."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rot.quat_to_matrix(turn) * scale
+    matrix[:3, 3] = place
+    return matrix
+
+
 @dataclass(frozen=True)
 class Node:
     """One node, its transform taken apart."""
@@ -29,6 +37,11 @@ class Node:
     """(4,) w, x, y, z."""
     scale: Array
     """(3,)"""
+    matrix: Array = field(init=False)
+    """(4, 4) the three in one."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", transform(self.place, self.turn, self.scale))
 
     @property
     def rest(self) -> dict[str, Array]:
@@ -53,6 +66,8 @@ class OpenedGlb:
     clips: list[str]
     """The names of the animations, ``""`` where one has none."""
     people: list[frozenset[int]]
+    loose: list[str]
+    """The names of meshes that hang on nobody."""
 
     @property
     def lengths(self) -> list[tuple[str, float]]:
@@ -74,8 +89,9 @@ class OpenedGlb:
         """The number, from 0, of the animation to read; None where nothing moves the person."""
         clips = self.clips
         if clip is None:
-            moving = [k for k, a in enumerate(self.channels) if any(node in self.people[person] for node, _ in a)]
-            ours = [k for k in moving if declared_fps(self.document.items("animations")[k]) is not None]
+            animations, who = self.document.items("animations"), self.people[person]
+            moving = [k for k, a in enumerate(self.channels) if any(n in who for n, _ in a)]
+            ours = [k for k in moving if declared_fps(animations[k]) is not None]
             chosen = ours[-1:] or moving[:1]  # a character comes back with what was made last for it
             if len(moving) > 1:
                 name = f"number {chosen[0] + 1}" + (f", {clips[chosen[0]]!r}" if clips[chosen[0]] else "")
@@ -114,7 +130,8 @@ def _node(document: Document, number: int, entry: dict[str, Any], count: int) ->
         raise document.bad(f"the children of {what} are not a list")
     place, turn, scale = np.zeros(3), rot.IDENTITY, np.ones(3)
     if entry.get("matrix") is not None:
-        place, turn, scale = _decompose(document, document.numbers(entry["matrix"], 16, f"the matrix of {what}"), what)
+        values = document.numbers(entry["matrix"], 16, f"the matrix of {what}")
+        place, turn, scale = _decompose(document, values, what)
     else:
         if entry.get("translation") is not None:
             place = document.numbers(entry["translation"], 3, f"the translation of {what}")
@@ -129,7 +146,9 @@ def _node(document: Document, number: int, entry: dict[str, Any], count: int) ->
 
 def printable(name: Any) -> str:
     """A name that can be shown and written anywhere."""
-    return "".join(c if c.isprintable() else "_" for c in name[:200]).strip() if isinstance(name, str) else ""
+    if isinstance(name, str):
+        return "".join(c if c.isprintable() else "_" for c in name[:200]).strip()
+    return ""
 
 
 def _decompose(document: Document, values: Array, what: str) -> tuple[Array, Array, Array]:

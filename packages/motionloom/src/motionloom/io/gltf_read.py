@@ -1,5 +1,6 @@
 """From a glTF document to a `Motion`: which nodes are a person, their rest pose, and their channels through time."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,7 +8,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document, read_document
 from motionloom.io.gltf_curves import channels_of, clock, declared_fps, read_curves
 from motionloom.io.gltf_nodes import Node, OpenedGlb, printable, read_nodes, read_parents, upwards
-from motionloom.io.gltf_rig import humanoid_nodes, posed, read_rig
+from motionloom.io.gltf_rig import Rig, humanoid_nodes, posed, read_rig
 from motionloom.motion import Motion
 
 MAX_SKINS = 64
@@ -44,8 +45,22 @@ def open_glb(path: str | Path) -> OpenedGlb:
     channels = channels_of(document, len(nodes))
     skins, humanoid = _skins(document, len(nodes)), humanoid_nodes(document, len(nodes))
     clips = [printable(animation.get("name")) for animation in document.items("animations")]
-    file = OpenedGlb(document, nodes, parents, order, channels, skins, humanoid, clips, [])
-    return replace(file, people=_people(file))
+    file = OpenedGlb(document, nodes, parents, order, channels, skins, humanoid, clips, [], [])
+    people = _people(file)
+    carriers = frozenset().union(*people)
+    loose = [
+        printable(entry.get("name")) or f"node_{number}"
+        for number, entry in enumerate(document.items("nodes"))
+        if entry.get("mesh") is not None and entry.get("skin") is None and carriers.isdisjoint(upwards(number, parents))
+    ]
+    return replace(file, people=people, loose=loose)
+
+
+def read_rigs(path: str | Path) -> Iterator[Rig]:
+    """Everybody in a file at rest, in its order; raises `MotionloomError` for everything that is wrong with it."""
+    file = open_glb(path)
+    for person in range(len(file.people)):
+        yield read_rig(file, person, {})
 
 
 def _motion(file: OpenedGlb, person: int, clip: int | None) -> Motion:
@@ -65,7 +80,10 @@ def _motion(file: OpenedGlb, person: int, clip: int | None) -> Motion:
 
 def _people(file: OpenedGlb) -> list[frozenset[int]]:
     """The joints of each person, the topmost included."""
-    order, parents, skins, known = file.order, file.parents, file.skins, set(file.humanoid.values())
+    order = file.order
+    parents = file.parents
+    skins = file.skins
+    known = set(file.humanoid.values())
     animated = {node for animation in file.channels for node, _ in animation}
     if skins:  # a skin in several trees is the person in the one with most of its joints
         groups = [max(_groups(set(skin), order, parents), key=len) for skin in skins]

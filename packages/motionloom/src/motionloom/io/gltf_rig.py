@@ -16,17 +16,24 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.io.glb import Document
-from motionloom.io.gltf_bind import SAME_PLACE, SAME_TURN, bind_pose, on_floor
 from motionloom.io.gltf_curves import Curves, sample
-from motionloom.io.gltf_nodes import OpenedGlb, upwards
+from motionloom.io.gltf_nodes import OpenedGlb, transform, upwards
+from motionloom.io.text import unique_names
 from motionloom.motion import Motion
+from motionloom.retarget.named import joint_names
 from motionloom.retarget.names import parts_by_name
-from motionloom.skeleton import Skeleton
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 MAX_JOINTS = 10_000
 FAR = 1e6
 """Metres; nobody is further away."""
+_SAME_TURN = np.radians(0.5)
+"""Turns that are nearer to each other are the same."""
+_SAME_PLACE = 1e-3
+"""Likewise places, in heights of the body."""
+_LEAN = np.cos(np.radians(75))
+"""Nobody is saved leaning further; what is, was made with another axis up."""
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 
 
@@ -41,6 +48,8 @@ class Rig:
     """For each joint the number of its node."""
     turns: Array
     """(joints, 4) at rest: world_from_node."""
+    rest: dict[int, Array]
+    """(4, 4) world_from_node at rest, of every node of the file."""
     shifted: frozenset[int]
     """Joints whose nodes are not where the mesh was bound, on what they hang on."""
 
@@ -86,8 +95,16 @@ def worlds(
         else:
             found.linear[n] = None
         found.places[n] = place
-        found.turns[n] = rot.normalize(rot.multiply(found.turns[p], turn)) if p in found.turns else turn
+        if p in found.turns:
+            turn = rot.normalize(rot.multiply(found.turns[p], turn))
+        found.turns[n] = turn
     return found
+
+
+def _size(worlds: Worlds, node: int) -> float:
+    """How much larger than its own measures a node is at rest."""
+    linear = worlds.linear[node]
+    return 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
 
 
 def read_rig(file: OpenedGlb, person: int, curves: Curves) -> Rig:
@@ -119,7 +136,13 @@ def read_rig(file: OpenedGlb, person: int, curves: Curves) -> Rig:
         on_floor=on_floor(np.array([places[n][1] for n in order])),
     )
     moved = frozenset(slots[n] for n in shifted)
-    return Rig(file, skeleton, tuple(order), np.array([turns[n] for n in order]), moved)
+    rest = worlds(file, [*above, *order], {})  # again: feet may hang elsewhere now
+    known: dict[int, Array] = {}
+    for n, place in zip(order, skeleton.rest_positions(), strict=True):
+        known[n] = transform(place, turns[n], np.full(3, _size(rest, n)))
+    matrices = world_from_nodes(file, file.order, known)
+    resting = np.array([turns[n] for n in order])
+    return Rig(file, skeleton, tuple(order), resting, matrices, moved)
 
 
 def posed(rig: Rig, curves: Curves, *, fps: float, times: Array) -> Motion:
@@ -131,7 +154,8 @@ def posed(rig: Rig, curves: Curves, *, fps: float, times: Array) -> Motion:
     frames, joints = len(times), len(rig.nodes)
     world, places = np.empty((frames, joints, 4)), np.empty((frames, joints, 3))
     for k, n in enumerate(rig.nodes):
-        world[:, k], places[:, k] = rot.multiply(moving.turns[n], rot.inverse(rig.turns[k])), moving.places[n]
+        world[:, k] = rot.multiply(moving.turns[n], rot.inverse(rig.turns[k]))
+        places[:, k] = moving.places[n]
     if not np.abs(places).max() < FAR:
         raise rig.file.document.bad(f"a joint is more than {FAR:g} m away; check the units")
     above = list(rig.skeleton.parents[1:])
@@ -155,7 +179,8 @@ def _without_still_armatures(file: OpenedGlb, person: int, curves: Curves) -> tu
     kept = {j for skin in file.skins for j in skin} or file.people[person]
     root = next(n for n in joints if file.parents[n] not in joints)
     while root not in kept and len(inside := [c for c in nodes[root].children if c in joints]) == 1:
-        own = {path: curves[root, path].values for path in nodes[root].rest if (root, path) in curves}
+        keyed = [path for path in nodes[root].rest if (root, path) in curves]
+        own = {path: curves[root, path].values for path in keyed}
         if any(np.ptp(v, axis=0).max() >= 1e-6 * max(1.0, np.abs(v).max()) for v in own.values()):
             break
         nodes[root] = replace(
@@ -194,18 +219,16 @@ def _bound(
     turns = {n: rest.turns[n][0] for n in order}
     places = {n: rest.places[n][0] for n in order}
     shifted: set[int] = set()
-    bound = bind_pose(file, list(rest.turns), set(order))
-    near = SAME_PLACE * float(np.ptp([place for place, _ in bound.values()], axis=0).max()) if bound else 0.0
+    bound = _bind_pose(file, list(rest.turns), set(order))
+    near = _SAME_PLACE * float(np.ptp([place for place, _ in bound.values()], axis=0).max()) if bound else 0.0
     if any(
-        abs(float(turn @ turns[n])) < np.cos(SAME_TURN / 2) or np.linalg.norm(place - places[n]) > near
+        abs(float(turn @ turns[n])) < np.cos(_SAME_TURN / 2) or np.linalg.norm(place - places[n]) > near
         for n, (place, turn) in bound.items()
     ):
         for n in order:
             p, node = file.parents[n], file.nodes[n]
             if n != order[0]:
-                linear = rest.linear[p]
-                size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
-                places[n] = places[p] + rot.rotate(turns[p], node.place * size)
+                places[n] = places[p] + rot.rotate(turns[p], node.place * _size(rest, p))
                 turns[n] = rot.multiply(turns[p], node.turn)
             if n in bound:
                 place, turns[n] = bound[n]
@@ -215,6 +238,102 @@ def _bound(
     if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
         raise file.document.bad(f"a joint is more than {FAR:g} m away; check the units")
     return turns, places, frozenset(shifted)
+
+
+# --- where the mesh was bound --------------------------------------------------------------------------------------
+
+# A skin's inverse bind matrices say where its joints were to each other, in the space of the mesh. Nothing says where
+# that space is in the world, and a topmost joint that was saved in the middle of an animation leans and sinks. So the
+# space is searched for in which the body stands on the floor: the world, a node above the skeleton, the mesh's node.
+
+
+def _bind_pose(file: OpenedGlb, line: list[int], joints: set[int]) -> dict[int, tuple[Array, Array]]:
+    """Places (3,) and turns (4,) in the world of those ``joints`` that skins hold, as their meshes were bound.
+
+    ``line``: the nodes from the top down to all joints, parents first. Empty where no skin can be read.
+    """
+    inverses: dict[int, dict[int, Array]] = {}  # (4, 4) joint_from_mesh of each skin's joints
+    for number, (skin, listed) in enumerate(zip(file.document.items("skins"), file.skins, strict=True)):
+        matrices = file.document.matrices(skin.get("inverseBindMatrices"), "inverse bind matrices")
+        if matrices is not None and len(matrices) >= len(listed):
+            matrices[:, 3] = [0.0, 0.0, 0.0, 1.0]
+            found = {n: m for n, m in zip(listed, matrices) if n in joints and _turn_of(m) is not None}
+            inverses |= {number: found} if found else {}
+    saved = world_from_nodes(file, file.order, {}) if inverses else {}
+    known = dict[int, Array]()
+    bound: dict[int, tuple[Array, Array]] = {}
+    for number, inverse in sorted(inverses.items(), key=lambda skin: -len(skin[1])):
+        tops = [n for n in line if n in inverse]
+        shared = next((n for n in tops if n in known), None)
+        if shared is not None:
+            space = known[shared] @ inverse[shared]
+        elif not known.keys().isdisjoint(above := upwards(tops[0], file.parents)[::-1]):
+            space = world_from_nodes(file, above, known)[tops[0]] @ inverse[tops[0]]
+        else:
+            space = _space(file, saved, number, inverse, tops[0])
+        for n in tops:
+            if n not in known and (turn := _turn_of(matrix := space @ np.linalg.inv(inverse[n]))) is not None:
+                known[n], bound[n] = matrix, (matrix[:3, 3], turn)
+    return bound
+
+
+def _turn_of(matrix: Array) -> Array | None:
+    """(4,) the rotation in a matrix (3 or 4 rows) that scales alike in all directions; None if it does more."""
+    linear = matrix[:3, :3]
+    size = np.linalg.norm(linear, axis=0)
+    if not ((size > 1e-12) & (size < 1e12)).all():  # nor where it is not finite
+        return None
+    turn = linear / size
+    if np.abs(turn.T @ turn - np.eye(3)).max() > 0.02 or np.linalg.det(turn) < 0:
+        return None
+    return rot.normalize(rot.matrix_to_quat(turn))
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of nodes above other nodes nobody checked the scales
+def world_from_nodes(file: OpenedGlb, line: list[int], known: Mapping[int, Array]) -> dict[int, Array]:
+    """(4, 4) of ``line``: nodes, parents first, from the top, as each hangs on what is ``known`` or on the world."""
+    found: dict[int, Array] = {}
+    for n in line:
+        own, p = file.nodes[n], file.parents[n]
+        found[n] = known[n] if n in known else found[p] @ own.matrix if p >= 0 else own.matrix
+    return found
+
+
+def on_floor(heights: Array) -> bool:
+    """Whether somebody whose joints are so high at rest (joints,) stands with the soles at 0."""
+    low, high = float(heights.min()), float(heights.max())
+    return high > 0 and abs(low) < 0.1 * (high - low)
+
+
+def _space(file: OpenedGlb, saved: dict[int, Array], skin: int, inverse: dict[int, Array], top: int) -> Array:
+    """(4, 4) world_from_mesh when a skin was bound, ``top`` being its topmost joint; ``saved``: world_from_node."""
+    standing = saved[top] @ inverse[top]
+    if _turn_of(standing) is None:
+        return standing
+    entries = file.document.items("nodes")
+    wearers = [k for k, entry in enumerate(entries) if entry.get("skin") == skin]
+    above = [n for n in upwards(top, file.parents)[1:] if n not in inverse]
+    tried = [np.eye(4), *(saved[n] for n in (*above, *wearers[:8]))]
+    inside = np.array([np.linalg.inv(m) for m in inverse.values()])
+    now, size = standing @ inside, float(np.cbrt(np.linalg.det(standing[:3, :3])))
+    first = list(inverse).index(top)
+    best, nearest = standing, -1.0
+    for space in tried:
+        if (turn := _turn_of(space)) is None:
+            continue
+        if abs(float(np.cbrt(np.linalg.det(space[:3, :3]))) / size - 1.0) >= 0.02:
+            # of another size than the mesh has: only its turn counts, around the topmost joint
+            space = transform(np.zeros(3), turn, np.full(3, size))
+            space[:3, 3] = now[first, :3, 3] - (space @ inside[first])[:3, 3]
+        apart = standing @ np.linalg.inv(space)
+        places = (space @ inside)[:, :3, 3]
+        if apart[1, 1] > np.cos(_SAME_TURN) and abs(now[0, 1, 3] - places[0, 1]) < _SAME_PLACE * np.ptp(places[:, 1]):
+            return standing  # turned and moved over the floor at most: that is where it stands
+        turn = _turn_of(apart)
+        near = -1.0 if turn is None else min(abs(float(turn[0])), 1.0)
+        if apart[1, 1] > _LEAN and near > nearest and on_floor(places[:, 1]):
+            best, nearest = space, near
+    return best
 
 
 # --- who hangs on whom --------------------------------------------------------------------------------------------
@@ -261,6 +380,11 @@ def _hung(parents: list[int], parts: dict[str, int]) -> list[int]:
     return hung
 
 
+_BONES = zip(joint_names("vrm"), SMPL22.names)
+VRM_BONES = dict(sorted(_BONES, key=lambda bone: ("right_" in bone[1], "left_" in bone[1])))
+"""VRM's names of the bones that are driven, and the joints of SMPL that they are; the middle first, then each side."""
+
+
 def humanoid_nodes(document: Document, count: int) -> dict[str, int]:
     """The nodes of body parts, as a VRM 0, a VRM 1 or a VRM animation names them; empty for other files."""
     extensions = document.json.get("extensions")
@@ -282,43 +406,3 @@ def humanoid_nodes(document: Document, count: int) -> dict[str, int]:
         for bone, part in VRM_BONES.items()
         if bone in bones
     }
-
-
-VRM_BONES = {
-    "hips": "pelvis",
-    "spine": "spine1",
-    "chest": "spine2",
-    "upperChest": "spine3",
-    "neck": "neck",
-    "head": "head",
-    **{
-        f"{side}{bone}": f"{side}_{part}"
-        for side in ("left", "right")
-        for bone, part in (
-            ("UpperLeg", "hip"),
-            ("LowerLeg", "knee"),
-            ("Foot", "ankle"),
-            ("Toes", "foot"),
-            ("Shoulder", "collar"),
-            ("UpperArm", "shoulder"),
-            ("LowerArm", "elbow"),
-            ("Hand", "wrist"),
-        )
-    },
-}
-"""VRM's names of the bones that are driven, and the joints of SMPL that they are."""
-
-
-def unique_names(names: list[str]) -> tuple[str, ...]:
-    """The second ``hand`` becomes ``hand_2``."""
-    taken: set[str] = set()
-    counts: dict[str, int] = {}
-    result = []
-    for name in names:
-        unique = name
-        while unique in taken:
-            counts[name] = counts.get(name, 1) + 1
-            unique = f"{name}_{counts[name]}"
-        taken.add(unique)
-        result.append(unique)
-    return tuple(result)

@@ -15,16 +15,17 @@ from motionloom.viz.figure import body_height, body_start
 
 Array = NDArray[np.float64]
 
-_FAMILIES = (
-    ("SMPL-22", set(SMPL22.names)),
-    ("CMU (ASF/AMC)", {"root", "lhipjoint", "lfemur", "ltibia", "upperback", "lowerneck", "rhumerus"}),
-    ("Daz (CMU as BVH)", {"hip", "abdomen", "chest", "lButtock", "lThigh", "lShin", "rForeArm"}),
-    ("Bandai Namco", {"joint_Root", "Hips", "UpperLeg_L", "LowerLeg_L", "Toes_L", "UpperArm_R"}),
-    ("Mixamo", {"mixamorig:Hips", "mixamorig:LeftUpLeg", "mixamorig:RightForeArm"}),
-    ("Unreal", {"pelvis", "thigh_l", "calf_l", "upperarm_r", "lowerarm_r"}),
-    ("Rigify", {"DEF-spine", "DEF-thigh.L", "DEF-shin.L", "DEF-forearm.R"}),
-    ("MotionBuilder", {"Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightForeArm"}),
-)
+_FAMILIES = {
+    "SMPL-22": " ".join(SMPL22.names),
+    "CMU (ASF/AMC)": "root lhipjoint lfemur ltibia upperback lowerneck rhumerus",
+    "Daz (CMU as BVH)": "hip abdomen chest lButtock lThigh lShin rForeArm",
+    "Bandai Namco": "joint_Root Hips UpperLeg_L LowerLeg_L Toes_L UpperArm_R",
+    "Mixamo": "mixamorig:Hips mixamorig:LeftUpLeg mixamorig:RightForeArm",
+    "Unreal": "pelvis thigh_l calf_l upperarm_r lowerarm_r",
+    "Rigify": "DEF-spine DEF-thigh.L DEF-shin.L DEF-forearm.R",
+    "MotionBuilder": "Hips LeftUpLeg LeftLeg LeftFoot RightForeArm",
+}
+"""Some of the joints of each, by which it is known."""
 _ENOUGH = 20_000
 """Frames, from all over the motion, by which a body's build is measured."""
 _BLOCK = 4096
@@ -71,9 +72,8 @@ def describe(motion: Motion) -> Info:
     else:
         height = body_height(motion.skeleton, places) if len(motion.skeleton) - start > 1 else 0.0
     tracks = [_track(motion.frames(k, k + _BLOCK), start, person is not None) for k in range(0, len(motion), _BLOCK)]
-    way, lowest, spans = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("way", "lowest", "spans"))
-    ground, floor = way[:, [0, 2]], float(np.percentile(lowest, 2))
-    low, high = np.min([t.low for t in tracks], axis=0), np.max([t.high for t in tracks], axis=0)
+    way, low, high = (np.concatenate(parts) for parts in zip(*tracks))
+    ground, floor = way[:, [0, 2]], float(np.percentile(low[:, 1], 2))
     return Info(
         skeleton=family(motion.skeleton),
         joints=len(motion.skeleton),
@@ -85,33 +85,18 @@ def describe(motion: Motion) -> Info:
         height=height,
         path=float(np.linalg.norm(np.diff(ground, axis=0), axis=-1).sum()),
         travel=float(np.linalg.norm(ground[-1] - ground[0])),
-        lowest=tuple(low.tolist()),
-        highest=tuple(high.tolist()),
+        lowest=tuple(low.min(axis=0).tolist()),
+        highest=tuple(high.max(axis=0).tolist()),
         floor=floor,
-        problems=tuple(_problems(motion, spans, way, height, floor)),
+        problems=tuple(_problems(motion, high - low, way, height, floor)),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Track:
-    """Where some frames of a body are."""
-
-    way: Array
-    """(frames, 3) metres: the pelvis, or the joint where the body begins."""
-    lowest: Array
-    """(frames,) metres: its lowest joint."""
-    spans: Array
-    """(frames, 3) metres from one end to the other."""
-    low: Array
-    """(3,) metres."""
-    high: Array
-
-
-def _track(motion: Motion, start: int, is_person: bool) -> _Track:
+def _track(motion: Motion, start: int, is_person: bool) -> tuple[Array, Array, Array]:
+    """(frames, 3) metres: the pelvis or the joint where the body begins, and the two corners of the box around it."""
     body = motion.positions()[:, start:]
     way = joints22(motion)[:, 0] if is_person else body[:, 0].copy()
-    low, high = body.min(axis=(0, 1)), body.max(axis=(0, 1))
-    return _Track(way, body[..., 1].min(axis=1), np.ptp(body, axis=1), low, high)
+    return way, body.min(axis=1), body.max(axis=1)
 
 
 def _person(motion: Motion, start: int) -> Array | None:
@@ -125,7 +110,9 @@ def _person(motion: Motion, start: int) -> Array | None:
 
 def family(skeleton: Skeleton) -> str:
     """The family of skeletons these joint names belong to, or ``unknown``."""
-    return next((name for name, some in _FAMILIES if some <= set(skeleton.names)), "unknown")
+    names = set(skeleton.names)
+    known = (name for name, some in _FAMILIES.items() if names.issuperset(some.split()))
+    return next(known, "unknown")
 
 
 def _problems(motion: Motion, spans: Array, way: Array, height: float, floor: float) -> list[str]:
@@ -169,9 +156,11 @@ def _largest_turn(motion: Motion) -> tuple[float, int, int]:
 def _stretch(motion: Motion) -> float:
     """Metres by which bones change, leaving out the travelling child of a still root."""
     assert motion.translations is not None
-    shortest, longest = np.full(len(motion.skeleton) - 1, np.inf), np.zeros(len(motion.skeleton) - 1)
+    shortest = np.full(len(motion.skeleton) - 1, np.inf)
+    longest = np.zeros(len(motion.skeleton) - 1)
     for begin in range(0, len(motion), _BLOCK):
         lengths = np.linalg.norm(motion.translations[begin : begin + _BLOCK, 1:], axis=-1)
-        shortest, longest = np.minimum(shortest, lengths.min(axis=0)), np.maximum(longest, lengths.max(axis=0))
+        shortest = np.minimum(shortest, lengths.min(axis=0))
+        longest = np.maximum(longest, lengths.max(axis=0))
     parents = np.array(motion.skeleton.parents[1:])
     return float((longest - shortest)[parents != 0].max(initial=0.0))

@@ -151,7 +151,9 @@ def _build(events: Iterator[Any], path: Path | str) -> Lined:
             if values > MAX_VALUES:
                 fail(path, line, f"the file holds more than {MAX_VALUES:,} values")
             if stack and isinstance(stack[-1].values, dict) and stack[-1].key is None:
-                _key(stack[-1], event.value, line, path)
+                if event.value in stack[-1].values:
+                    fail(path, line, f"the key {shown(event.value)} stands here a second time; drop one of them")
+                stack[-1].key, stack[-1].key_line = event.value, line
                 continue
             found = Lined(line, _scalar(event, path, line))
         if stack:
@@ -170,12 +172,6 @@ def _refuse_clever(event: Any, kind: type, path: Path | str, line: int) -> None:
         fail(path, line, f"anchors and aliases ({shown('&' + str(event.anchor))}) are not read; write the value out")
     if event.tag is not None:
         fail(path, line, f"tags ({shown(str(event.tag))}) are not read; write the value without it")
-
-
-def _key(opened: _Open, key: str, line: int, path: Path | str) -> None:
-    if key in opened.values:
-        fail(path, line, f"the key {shown(key)} stands here a second time; drop one of them")
-    opened.key, opened.key_line = key, line
 
 
 def _put(opened: _Open, found: Lined, path: Path | str) -> None:

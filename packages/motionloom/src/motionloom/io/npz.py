@@ -34,6 +34,7 @@ import zipfile
 import zlib
 from collections.abc import Container, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, TypedDict, cast
 
@@ -106,23 +107,24 @@ def _body_arrays(skeleton: Skeleton) -> dict[str, np.ndarray]:
         arrays["sole_points"] = np.concatenate(list(skeleton.soles.values()))
     if (poses := skeleton.poses) is not None:
         arrays |= {"pose_root": poses.root, "pose_rotations": poses.rotations}
-        arrays |= {} if poses.translations is None else {"pose_translations": poses.translations}
+        if poses.translations is not None:
+            arrays |= {"pose_translations": poses.translations}
     return arrays
 
 
 def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
     """Read a motion; ``fps`` replaces the stored rate. Raises `MotionloomError` for anything but the layouts above."""
-    arrays = read_arrays(path)
+    file = _Archive(path, read_arrays(path))
     rate = fps
-    if rate is None and "fps" in arrays:
-        rate = float(_array(arrays, "fps", (), path=path))
+    if rate is None and "fps" in file:
+        rate = float(file.take("fps", ()))
     if rate is not None and not 1e-4 <= rate <= 1e6:
         raise MotionloomError(f"{path} is said to have {rate:g} frames per second; give the true frame rate")
-    if "rotations" in arrays:
+    if "rotations" in file:
         if rate is None:
             raise MotionloomError(f"{path} has no 'fps'; give the frame rate")
-        return _motion(arrays, rate, path)
-    return _from_positions(arrays, rate, path)
+        return _motion(file, rate)
+    return _from_positions(file, rate)
 
 
 def read_arrays(
@@ -146,7 +148,7 @@ def read_arrays(
             with archive.open(member) as stream:
                 what = f"{path}: the array {text.shown(name)}"
                 found[name] = _read_array(cast(BinaryIO, stream), member.file_size, most=most, what=what)
-            most -= _numbers(found[name])
+            most -= max(found[name].size, found[name].nbytes // 8)
         return found
 
 
@@ -171,16 +173,12 @@ def opened(
                 )
             if any(m.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for m in members):
                 raise MotionloomError(f"{path} is packed in a way that NumPy does not use; save it with NumPy")
-            yield archive, {m.filename.removesuffix(".npy"): m for m in members}, most_numbers(len(data))
+            most = max(SPARE_NUMBERS, NUMBERS_PER_BYTE * len(data))
+            yield archive, {m.filename.removesuffix(".npy"): m for m in members}, most
     except MotionloomError:
         raise
     except BROKEN as error:
         raise MotionloomError(f"{path} is a damaged NPZ archive ({type(error).__name__})") from None
-
-
-def most_numbers(size: int) -> int:
-    """How many numbers a packed file of so many bytes may unfold to."""
-    return max(SPARE_NUMBERS, NUMBERS_PER_BYTE * size)
 
 
 def read_array(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> np.ndarray:
@@ -192,7 +190,8 @@ def read_array(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> np.ndarr
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return _read_array(io.BytesIO(data), len(data), most=len(data) + 1, what=f"{path}: the array")
+            size, what = len(data), f"{path}: the array"
+            return _read_array(io.BytesIO(data), size, most=size + 1, what=what)
     except MotionloomError:
         raise
     except BROKEN as error:
@@ -207,10 +206,6 @@ def read_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype]:
     if len(shape) > 32 or not all(type(n) is int and 0 <= n < 1 << 62 for n in shape):
         raise ValueError("it has no shape")
     return shape, fortran, dtype
-
-
-def _numbers(array: np.ndarray) -> int:
-    return max(array.size, array.nbytes // 8)
 
 
 def _read_array(stream: BinaryIO, size: int, *, most: int, what: str) -> np.ndarray:
@@ -234,67 +229,74 @@ def _read_array(stream: BinaryIO, size: int, *, most: int, what: str) -> np.ndar
     return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
 
-def _listed(arrays: dict[str, np.ndarray]) -> str:
-    return ", ".join(text.shown(n) for n in list(arrays)[:12]) or "none"
+@dataclass(frozen=True)
+class _Archive:
+    """Arrays of a file, checked when they are taken."""
+
+    path: Path | str
+    arrays: dict[str, np.ndarray]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.arrays
+
+    def take(self, name: str, shape: tuple[int | None, ...], kinds: str = "fiu") -> np.ndarray:
+        """The array of that name with the wanted shape (None: any length) and kind of number."""
+        if name not in self:
+            raise MotionloomError(f"{self.path} has no array '{name}'; it has {self.listed()}")
+        array = self.arrays[name]
+        same = len(array.shape) == len(shape) and all(w is None or w == n for w, n in zip(shape, array.shape))
+        if not same or array.dtype.kind not in kinds:
+            wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+            raise self.bad(f"'{name}' must have the shape {wanted}; it is {array.shape} of {array.dtype}")
+        # without a copy of all numbers; NaN is neither
+        small = kinds == "U" or not array.size or (array.min() >= -text.LIMIT and array.max() <= text.LIMIT)
+        if not small:
+            raise self.bad(f"'{name}' has numbers that are not finite (NaN or infinity) or above 1e9")
+        return array
+
+    def bad(self, what: object) -> MotionloomError:
+        """The error for this file."""
+        return MotionloomError(f"{self.path}: {what}")
+
+    def listed(self) -> str:
+        """The names of its arrays for a message."""
+        return ", ".join(text.shown(n) for n in list(self.arrays)[:12]) or "none"
 
 
-def _array(
-    arrays: dict[str, np.ndarray], name: str, shape: tuple[int | None, ...], *, path: Path | str, kinds: str = "fiu"
-) -> np.ndarray:
-    """The array of that name with the wanted shape (None: any length) and kind of number."""
-    if name not in arrays:
-        raise MotionloomError(f"{path} has no array '{name}'; it has {_listed(arrays)}")
-    found = arrays[name]
-    same = len(found.shape) == len(shape) and all(w is None or w == n for w, n in zip(shape, found.shape))
-    if not same or found.dtype.kind not in kinds:
-        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-        raise MotionloomError(f"{path}: '{name}' must have the shape {wanted}; it is {found.shape} of {found.dtype}")
-    if kinds != "U" and not _small(found):
-        raise MotionloomError(f"{path}: '{name}' has numbers that are not finite (NaN or infinity) or above 1e9")
-    return found
-
-
-def _small(found: np.ndarray) -> bool:
-    """Whether all numbers are finite and within the limit, without a copy of them all."""
-    if not found.size:
-        return True
-    return bool(found.min() >= -text.LIMIT and found.max() <= text.LIMIT)  # NaN is neither
-
-
-def _motion(arrays: dict[str, np.ndarray], fps: float, path: Path | str) -> Motion:
-    version = int(_array(arrays, "version", (), path=path, kinds="iu")) if "version" in arrays else VERSION
+def _motion(file: _Archive, fps: float) -> Motion:
+    version = int(file.take("version", (), "iu")) if "version" in file else VERSION
     if version != VERSION:
-        raise MotionloomError(f"{path} has the layout of version {version}; this program reads version {VERSION}")
-    names = tuple(str(n) for n in _array(arrays, "names", (None,), path=path, kinds="U"))
+        raise MotionloomError(f"{file.path} has the layout of version {version}; this program reads version {VERSION}")
+    names = tuple(str(n) for n in file.take("names", (None,), "U"))
     joints = len(names)
     if joints > MAX_JOINTS:
-        raise MotionloomError(f"{path} has {joints} joints; at most {MAX_JOINTS} are read")
-    parents = tuple(int(p) for p in _array(arrays, "parents", (joints,), path=path, kinds="iu"))
-    offsets = _array(arrays, "offsets", (joints, 3), path=path)
-    ends = {int(e) for e in _array(arrays, "ends", (None,), path=path)} if "ends" in arrays else set()
+        raise MotionloomError(f"{file.path} has {joints} joints; at most {MAX_JOINTS} are read")
+    parents = tuple(int(p) for p in file.take("parents", (joints,), "iu"))
+    offsets = file.take("offsets", (joints, 3))
+    ends = {int(e) for e in file.take("ends", (None,))} if "ends" in file else set()
     if any(not 0 <= e < joints for e in ends):
-        raise MotionloomError(f"{path}: 'ends' names joints that do not exist; there are {joints}")
-    root, rotations, moved = _frames(arrays, ("root", "rotations", "translations"), joints, path)
+        raise file.bad(f"'ends' names joints that do not exist; there are {joints}")
+    root, rotations, moved = _frames(file, ("root", "rotations", "translations"), joints)
     groups = SMPL22.groups if names == SMPL22.names and parents == SMPL22.parents else {}
     try:
-        body = _body(arrays, names, path)
+        body = _body(file, names)
         skeleton = Skeleton(names, parents, offsets.astype(np.float64), frozenset(ends), groups, **body)
         return Motion(skeleton, fps, root, rotations, moved)
     except MotionloomError as error:
-        raise MotionloomError(f"{path}: {error}") from None
+        raise file.bad(error) from None
 
 
 def _frames(
-    arrays: dict[str, np.ndarray], names: tuple[str, str, str], joints: int, path: Path | str
+    file: _Archive, names: tuple[str, str, str], joints: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Places of the root, rotations, and translations where there are any."""
-    root = _array(arrays, names[0], (None, 3), path=path)
-    rotations = _array(arrays, names[1], (len(root), joints, 4), path=path).astype(np.float64)
+    root = file.take(names[0], (None, 3))
+    rotations = file.take(names[1], (len(root), joints, 4)).astype(np.float64)
     lengths = np.linalg.norm(rotations, axis=-1)
     if not (np.abs(lengths - 1) < 1e-3).all():
         odd = lengths.flat[np.abs(lengths - 1).argmax()]
-        raise MotionloomError(f"{path}: '{names[1]}' must be unit quaternions; one has the length {odd:g}")
-    moved = _array(arrays, names[2], (len(root), joints, 3), path=path) if names[2] in arrays else None
+        raise file.bad(f"'{names[1]}' must be unit quaternions; one has the length {odd:g}")
+    moved = file.take(names[2], (len(root), joints, 3)) if names[2] in file else None
     return root, rotations, moved
 
 
@@ -307,41 +309,41 @@ class _Body(TypedDict, total=False):
     poses: Poses
 
 
-def _body(arrays: dict[str, np.ndarray], names: tuple[str, ...], path: Path | str) -> _Body:
+def _body(file: _Archive, names: tuple[str, ...]) -> _Body:
     """The opposite of `_body_arrays`."""
     body = _Body()
-    if "on_floor" in arrays:
-        body["on_floor"] = bool(_array(arrays, "on_floor", (), path=path, kinds="b"))
-    if "humanoid" in arrays:
-        pairs = _array(arrays, "humanoid", (None, 2), path=path, kinds="U")
+    if "on_floor" in file:
+        body["on_floor"] = bool(file.take("on_floor", (), "b"))
+    if "humanoid" in file:
+        pairs = file.take("humanoid", (None, 2), "U")
         body["humanoid"] = {str(part): str(name) for part, name in pairs}
         if any(part not in SMPL22.names or name not in names for part, name in body["humanoid"].items()):
-            raise MotionloomError(f"{path}: 'humanoid' must pair joints of SMPL with joints of the file")
-    if "sole_joints" in arrays:
-        joints = _array(arrays, "sole_joints", (None,), path=path, kinds="iu")
-        points = _array(arrays, "sole_points", (len(joints), 3), path=path).astype(np.float64)
+            raise file.bad("'humanoid' must pair joints of SMPL with joints of the file")
+    if "sole_joints" in file:
+        joints = file.take("sole_joints", (None,), "iu")
+        points = file.take("sole_points", (len(joints), 3)).astype(np.float64)
         if any(not 0 <= j < len(names) for j in joints):
-            raise MotionloomError(f"{path}: 'sole_joints' names joints that do not exist; there are {len(names)}")
+            raise file.bad(f"'sole_joints' names joints that do not exist; there are {len(names)}")
         body["soles"] = {int(j): points[joints == j] for j in dict.fromkeys(joints.tolist())}
-    if "pose_root" in arrays:
-        frames = _frames(arrays, ("pose_root", "pose_rotations", "pose_translations"), len(names), path)
+    if "pose_root" in file:
+        frames = _frames(file, ("pose_root", "pose_rotations", "pose_translations"), len(names))
         if not len(frames[0]):
-            raise MotionloomError(f"{path}: 'pose_root' has no pose; leave it out")
+            raise file.bad("'pose_root' has no pose; leave it out")
         body["poses"] = Poses(*frames)
     return body
 
 
-def _from_positions(arrays: dict[str, np.ndarray], fps: float | None, path: Path | str) -> Motion:
-    name = next((n for n in _POSITIONS if n in arrays), None)
+def _from_positions(file: _Archive, fps: float | None) -> Motion:
+    name = next((n for n in _POSITIONS if n in file), None)
     if name is None:
         robot = "joint angles of a robot, which go with its model (docs/robots.md)"
-        held = robot if "qpos" in arrays else _listed(arrays)
-        raise MotionloomError(f"{path} has neither 'rotations' nor 'positions'; it has {held}")
-    places = _array(arrays, name, (None, len(SMPL22), 3), path=path).astype(np.float64)
+        held = robot if "qpos" in file else file.listed()
+        raise MotionloomError(f"{file.path} has neither 'rotations' nor 'positions'; it has {held}")
+    places = file.take(name, (None, len(SMPL22), 3)).astype(np.float64)
     if fps is None or not len(places):
-        raise MotionloomError(f"{path} has positions but no 'fps' or no frames; give the frame rate")
+        raise MotionloomError(f"{file.path} has positions but no 'fps' or no frames; give the frame rate")
     if np.abs(places).max() > 1e6:
-        raise MotionloomError(f"{path}: '{name}' reaches {np.abs(places).max():g}; positions must be in metres")
+        raise file.bad(f"'{name}' reaches {np.abs(places).max():g}; positions must be in metres")
     from motionloom.kinematics.ik import motion_from_positions
 
     return motion_from_positions(places, fps)

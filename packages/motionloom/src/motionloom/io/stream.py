@@ -8,6 +8,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from functools import partial
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
 
@@ -109,14 +111,15 @@ def open_stream(
     if total is not None:
         check_length(path, total=total, fps=fps, joints=joints)
     if path.suffix.lower() == ".bvh":
-        return _Growing(path, total, order, unit)
+        return _Growing(path, partial(GrowingBvh, order=order, unit=unit, frames=total))
     return Kept(path, lambda whole: save(whole, path, captions=[caption]))
 
 
 def check_length(path: Path, *, total: int, fps: float, joints: int = PERSON) -> None:
     """Refuse more frames of so many joints than the format, or this machine's memory, can hold."""
     suffix = path.suffix.lower()
-    most = MAX_BVH_FRAMES * PERSON // max(joints, PERSON) if suffix == ".bvh" else MAX_POSES // max(joints, PERSON)
+    poses = MAX_BVH_FRAMES * PERSON if suffix == ".bvh" else MAX_POSES
+    most = poses // max(joints, PERSON)
     most = min(most, int(MAX_GIF_SECONDS * fps)) if suffix == ".gif" else most
     if total > most:
         better = "write an .mp4 or .bvh, or" if suffix == ".gif" else "split it, or"
@@ -129,9 +132,9 @@ def check_length(path: Path, *, total: int, fps: float, joints: int = PERSON) ->
 class _Growing(Stream):
     """BVH: on the disk, in a file beside the target, until it is closed."""
 
-    def __init__(self, path: Path, total: int | None, order: str | Mapping[str, str], unit: float) -> None:
+    def __init__(self, path: Path, begin: Callable[[FileIO, Motion], GrowingBvh]) -> None:
         super().__init__(path)
-        self._total, self._order, self._unit = total, order, unit
+        self._begin = begin
         self._stack = ExitStack()
         self._bvh: GrowingBvh | None = None
 
@@ -140,7 +143,7 @@ class _Growing(Stream):
             if self._bvh is None:
                 temporary = self._stack.enter_context(atomic_path(self.path))
                 file = self._stack.enter_context(temporary.open("wb", buffering=0))
-                self._bvh = GrowingBvh(file, piece, order=self._order, unit=self._unit, frames=self._total)
+                self._bvh = self._begin(file, piece)
             self._bvh.write(piece)
         except OSError as error:
             raise MotionloomError(f"cannot write {self.path}: {error.strerror or error}") from error
@@ -184,7 +187,8 @@ class Kept(Stream):
 def joined(pieces: Sequence[Motion]) -> Motion:
     """Consecutive pieces of one skeleton and rate as one motion; bones of constant lengths."""
     root = np.concatenate([piece.root for piece in pieces])
-    return replace(pieces[0], root=root, rotations=np.concatenate([piece.rotations for piece in pieces]))
+    rotations = np.concatenate([piece.rotations for piece in pieces])
+    return replace(pieces[0], root=root, rotations=rotations)
 
 
 def resampled(pieces: Iterable[Motion], fps: float) -> Iterator[Motion]:

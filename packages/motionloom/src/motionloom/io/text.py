@@ -84,7 +84,9 @@ def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
 
 
 def _inside(value: Any) -> Iterable[Any]:
-    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    if isinstance(value, dict):
+        return value.values()
+    return value if isinstance(value, list) else ()
 
 
 def word(raw: bytes) -> str:
@@ -98,6 +100,19 @@ def word(raw: bytes) -> str:
 def shown(raw: bytes | str, limit: int = 40) -> str:
     """A piece of a file as it may appear in a message: quoted, without control characters, not too long."""
     return quoted(word(raw) if isinstance(raw, bytes) else raw, limit)
+
+
+def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
+    """The names, of which a second ``hand`` becomes ``hand_2``, as does a first one that is ``taken``."""
+    used, counts, unique = set(taken), dict[str, int](), []
+    for name in names:
+        free = name
+        while free in used:
+            counts[name] = counts.get(name, 1) + 1
+            free = f"{name}_{counts[name]}"
+        used.add(free)
+        unique.append(free)
+    return tuple(unique)
 
 
 def number(raw: bytes | str) -> float | None:

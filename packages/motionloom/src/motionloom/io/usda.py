@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
-from motionloom.io.body import MATERIALS, body
+from motionloom.io.body import MATERIALS, body, check_people
 from motionloom.io.gltf_mesh import Surface
+from motionloom.io.text import unique_names
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -36,15 +37,12 @@ def save_usda(
     motion, name the people. Raises `MotionloomError` for no motions, names of another count, rates that differ, or a
     path that cannot be written.
     """
-    if not motions:
-        raise MotionloomError("there is no motion to save; give at least one")
-    if names is not None and len(names) != len(motions):
-        raise MotionloomError(f"{len(motions)} motions need as many names; got {len(names)}")
+    check_people(motions, names)
     rates = {motion.fps for motion in motions}
     if len(rates) > 1:
         raise MotionloomError(f"{path}: a USD scene has one frame rate; got {sorted(rates)}; resample the motions")
     tail = [""] if len(motions) == 1 else [f"_{k + 1}" for k in range(len(motions))]
-    titles = _unique([f"person{t}" for t in tail] if names is None else [_identifier(name) for name in names])
+    titles = unique_names([f"person{t}" for t in tail] if names is None else [_identifier(name) for name in names])
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_head(motions))
         file.write('def Xform "motion"\n{\n')
@@ -69,7 +67,8 @@ def _write_person(file: IO[str], motion: Motion, title: str, surfaces: Sequence[
     paths = joint_paths(skeleton)
     rest = skeleton.rest_positions()
     file.write(f'    def SkelRoot "{title}" (\n        prepend apiSchemas = ["SkelBindingAPI"]\n    )\n    {{\n')
-    low, high = _extent(motion)
+    around = motion.positions().reshape(-1, 3)
+    low, high = around.min(axis=0) - 0.3, around.max(axis=0) + 0.3  # with room for a body
     file.write(f"        float3[] extent = [{_tuple(low)}, {_tuple(high)}]\n")
     file.write('        def Skeleton "skeleton" (\n            prepend apiSchemas = ["SkelBindingAPI"]\n        )\n')
     file.write(f"        {{\n            uniform token[] joints = {_words(paths)}\n")
@@ -148,7 +147,7 @@ def _write_materials(file: IO[str], surfaces: Sequence[Surface], place: str) -> 
 def _write_surface(file: IO[str], surface: Surface, number: int, place: str, colour: int) -> None:
     tab, width = " " * 12, surface.joints.shape[1]
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-    name = f"{_identifier(surface.name)}_{number}"
+    name, vertex = f"{_identifier(surface.name)}_{number}", 'interpolation = "vertex"'
     file.write(f'        def Mesh "{name}" (\n            prepend apiSchemas = ')
     file.write('["SkelBindingAPI", "MaterialBindingAPI"]\n        )\n        {\n')
     file.write(f"{tab}float3[] extent = [{_tuple(low)}, {_tuple(high)}]\n")
@@ -156,11 +155,11 @@ def _write_surface(file: IO[str], surface: Surface, number: int, place: str, col
     _write_list(file, f"{tab}int[] faceVertexIndices", map(str, surface.triangles.ravel().tolist()))
     _write_list(file, f"{tab}point3f[] points", map(_tuple, surface.points))
     if surface.normals is not None:
-        _write_list(file, f"{tab}normal3f[] normals", map(_tuple, surface.normals), 'interpolation = "vertex"')
+        _write_list(file, f"{tab}normal3f[] normals", map(_tuple, surface.normals), vertex)
     if surface.texture is not None:
         upright = surface.texture * [1.0, -1.0] + [0.0, 1.0]  # USD's begin in the lower left
-        _write_list(file, f"{tab}texCoord2f[] primvars:st", map(_tuple, upright), 'interpolation = "vertex"')
-    shares = f'elementSize = {width}\n{tab}    interpolation = "vertex"'
+        _write_list(file, f"{tab}texCoord2f[] primvars:st", map(_tuple, upright), vertex)
+    shares = f"elementSize = {width}\n{tab}    {vertex}"
     joints, weights = surface.joints.ravel().tolist(), surface.weights.ravel().tolist()
     _write_list(file, f"{tab}int[] primvars:skel:jointIndices", map(str, joints), shares)
     _write_list(file, f"{tab}float[] primvars:skel:jointWeights", map(_number, weights), shares)
@@ -186,7 +185,7 @@ def joint_paths(skeleton: Skeleton) -> list[str]:
 
     Raises `MotionloomError` for a chain of joints so long that their paths fill the memory.
     """
-    words = _unique([_identifier(name) for name in skeleton.names])
+    words = unique_names([_identifier(name) for name in skeleton.names])
     paths: list[str] = []
     for word, parent in zip(words, skeleton.parents, strict=True):
         paths.append(word if parent < 0 else f"{paths[parent]}/{word}")
@@ -201,21 +200,10 @@ def _identifier(name: str) -> str:
     return f"_{plain}" if plain[0].isdigit() else plain
 
 
-def _unique(names: Sequence[str]) -> list[str]:
-    taken: set[str] = set()
-    found = []
-    for name in names:
-        free, k = name, 2
-        while free in taken:
-            free, k = f"{name}_{k}", k + 1
-        taken.add(free)
-        found.append(free)
-    return found
-
-
 def _words(names: Sequence[str]) -> str:
     escaped = [name.replace("\\", "\\\\").replace('"', '\\"') for name in names]
-    return "[" + ", ".join(f'"{"".join(c if c.isprintable() else "?" for c in name)}"' for name in escaped) + "]"
+    shown = ("".join(c if c.isprintable() else "?" for c in name) for name in escaped)
+    return "[" + ", ".join(f'"{name}"' for name in shown) + "]"
 
 
 def _number(value: float) -> str:
@@ -230,9 +218,3 @@ def _shift(place: Array) -> str:
     """A matrix that moves and does not turn."""
     x, y, z = (_number(float(v)) for v in place)
     return f"((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), ({x}, {y}, {z}, 1))"
-
-
-def _extent(motion: Motion) -> tuple[Array, Array]:
-    """The box around all joints at all times, with room for a body."""
-    places = motion.positions().reshape(-1, 3)
-    return places.min(axis=0) - 0.3, places.max(axis=0) + 0.3

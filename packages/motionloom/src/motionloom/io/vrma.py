@@ -53,7 +53,8 @@ def save_vrma(motion: Motion, path: str | Path) -> Path:
 
 def _bones(skeleton: Skeleton) -> dict[str, int] | None:
     """The joints of an avatar's body parts; None for what is none, or does not rest as such files have to."""
-    bones = {part: skeleton.index(name) for part, name in skeleton.humanoid.items() if name in skeleton.names}
+    stated = skeleton.humanoid.items()
+    bones = {part: skeleton.index(name) for part, name in stated if name in skeleton.names}
     if not bones.keys() >= _NEEDED or any(bones["pelvis"] not in skeleton.ancestors(j) for j in bones.values()):
         return None
     rest = skeleton.rest_positions()

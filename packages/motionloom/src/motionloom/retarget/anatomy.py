@@ -17,7 +17,7 @@ the same pose when these agree. In a sensible rest pose (T, A or arms down; upri
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,15 +36,17 @@ from motionloom.retarget.axes import (
     SHOULDERS,
     SPINE,
     TOES,
+    arms_hang,
     collar_frames,
     frame,
     hips_line,
+    measure_frames,
+    measure_sole,
     shoulder_line,
+    stands_on_flat_feet,
     unit,
 )
 from motionloom.retarget.joint_map import JointMap, Override, joint_map
-from motionloom.retarget.measured import arms_hang, measure_frames, measure_sole, stands_on_flat_feet
-from motionloom.retarget.topology import below
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
@@ -70,16 +72,16 @@ class Body:
     """(22, 4) joint_from_anatomy."""
     upright: bool
     """Whether the rest pose is a standing person; the frames are read off it then."""
-    measured: bool
-    """Whether the frames were measured from poses; where they are neither, limbs have an arbitrary twist."""
-    up: Array
-    """(3,) up in rest pose; +Y where the rest pose is no standing person."""
-    toe_height: float
-    """Metres from the ground up to the toe joint on a flat foot."""
     shoulders: Array
     """(2, 3) metres from the joint of the chest to shoulders that rest, in the anatomical frame of the chest."""
     tips: Array
     """(22, 3) metres in the frame of the joint that turns it: where a foot without toes has them; 0 elsewhere."""
+    measured: bool = False
+    """Whether the frames were measured from poses; where they are neither, limbs have an arbitrary twist."""
+    up: Array = field(default_factory=lambda: np.eye(3)[1])
+    """(3,) up in rest pose; +Y where the rest pose is no standing person."""
+    toe_height: float = 0.0
+    """Metres from the ground up to the toe joint on a flat foot."""
 
     @property
     def on_floor(self) -> bool:
@@ -123,7 +125,9 @@ class Body:
     def bone(self, joint: int) -> float:
         """Metres from an SMPL joint to the one its bone runs to."""
         child = CHILD[joint]
-        return 0.0 if child is None else float(np.linalg.norm(self.rest[child] - self.rest[joint]))
+        if child is None:
+            return 0.0
+        return float(np.linalg.norm(self.rest[child] - self.rest[joint]))
 
 
 _LAST: deque[tuple[Skeleton, Body]] = deque(maxlen=8)
@@ -159,28 +163,26 @@ def _read_body(skeleton: Skeleton, override: Override | None, poses: Poses | Non
             "the skeleton is no person but an animal on four legs: at rest its spine lies along the ground and its "
             "arms reach it; name its joints in a joint map to read it as a person all the same"
         )
-    axes = _rest_axes(rest)
-    drivers = found.drivers(skeleton)
-    if axes is not None:
-        # of the uniform person, whose legs differ by millimetres, it is measured, as when the weights were trained
-        upright = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
-        toes = rest[list(TOES), 1]
-        planted = float(toes.mean() if _lifted_foot(rest, axes) is None else toes.min())
-        height = planted if upright else _toe_height(skeleton, found, rest, axes[1])
-        frames = _rest_frames(rest, axes)
-        resting = _on_chest(skeleton, drivers, frames, rest)
-        body = Body(skeleton, points, drivers, rest, frames, True, False, axes[1], height, resting, tips)
-        return body if poses is None or skeleton.on_floor else _on_measured_feet(body, poses)
-    frames = _odd_frames(rest)
+    axes, drivers = _rest_axes(rest), found.drivers(skeleton)
+    frames = _odd_frames(rest) if axes is None else _rest_frames(rest, axes)
     resting = _on_chest(skeleton, drivers, frames, rest)
-    body = Body(skeleton, points, drivers, rest, frames, False, False, np.eye(3)[1], 0.0, resting, tips)
-    return body if poses is None else _measured(body, poses)
+    body = Body(skeleton, points, drivers, rest, frames, axes is not None, resting, tips)
+    if axes is None:
+        return body if poses is None else _measured(body, poses)
+    # of the uniform person, whose legs differ by millimetres, it is measured, as when the weights were trained
+    upright = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
+    toes = rest[list(TOES), 1]
+    planted = float(toes.mean() if _lifted_foot(rest, axes) is None else toes.min())
+    height = planted if upright else _toe_height(skeleton, found, rest, axes[1])
+    body = replace(body, up=axes[1], toe_height=height)
+    return body if poses is None or skeleton.on_floor else _on_measured_feet(body, poses)
 
 
 def _measured(body: Body, poses: Poses) -> Body:
     """The body with all frames measured from poses."""
     places, world = _posed(body, poses)
-    body = replace(body, frames=measure_frames(places, world, body.drivers, body.frames), measured=True)
+    frames = measure_frames(places, world, body.drivers, body.frames)
+    body = replace(body, frames=frames, measured=True)
     chest = body.drivers[CHEST]
     if chest is None:
         return body
@@ -221,7 +223,8 @@ def _posed(body: Body, poses: Poses) -> tuple[Array, Array]:
 
 def _on_four_legs(rest: Array) -> bool:
     """Whether arms hang down beside the legs from a spine that is level."""
-    legs, arms = (rest[[7, 8]] - rest[[1, 2]]).sum(axis=0), (rest[[20, 21]] - rest[[16, 17]]).sum(axis=0)
+    legs = (rest[[7, 8]] - rest[[1, 2]]).sum(axis=0)
+    arms = (rest[[20, 21]] - rest[[16, 17]]).sum(axis=0)
     spine = rest[12] - rest[0]
     return float(unit(legs) @ unit(arms)) > 0.8 and abs(float(unit(legs) @ unit(spine))) < 0.5
 
@@ -231,10 +234,13 @@ def _missing_toes(rest: Array) -> Array:
     tips = np.zeros((22, 3))
     up = _snap(rest[12] - rest[0])
     ahead = unit(np.cross(_snap(rest[1] - rest[2]), up))
-    leg = np.linalg.norm(rest[[4, 5]] - rest[[1, 2]], axis=-1) + np.linalg.norm(rest[[7, 8]] - rest[[4, 5]], axis=-1)
+    legs = np.linalg.norm(rest[[4, 5]] - rest[[1, 2]], axis=-1) + np.linalg.norm(rest[[7, 8]] - rest[[4, 5]], axis=-1)
+    leg = float(legs.mean())
     for foot, toe in zip(FEET, TOES):
         if np.linalg.norm(rest[toe] - rest[foot]) < 1e-6:
-            tips[toe] = 0.16 * float(leg.mean()) * ahead - _fall(rest[foot], float(leg.mean())) * up
+            height = float(rest[foot, 1])  # half way to the ground where that is close
+            fall = min(0.05 * leg, 0.5 * height) if 0 < height < 0.5 * leg else 0.05 * leg
+            tips[toe] = 0.16 * leg * ahead - fall * up
     return tips
 
 
@@ -249,11 +255,6 @@ def _check_legs(skeleton: Skeleton, found: JointMap, rest: Array) -> None:
             )
         if np.linalg.norm(rest[child] - rest[j]) < 1e-6:
             raise MotionloomError(f"the skeleton cannot be retargeted: the bone below {SMPL22.names[j]} has no length")
-
-
-def _fall(ankle: Array, leg: float) -> float:
-    """Metres from an ankle down to toes that nobody modelled; half way to the ground where that is close."""
-    return min(0.05 * leg, 0.5 * float(ankle[1])) if 0 < ankle[1] < 0.5 * leg else 0.05 * leg
 
 
 def _snap(v: Array) -> Array:
@@ -328,8 +329,8 @@ def _toe_height(skeleton: Skeleton, found: JointMap, rest: Array, up: Array) -> 
     heights = skeleton.rest_positions() @ up
     depths = []
     for foot, toe in zip(FEET, TOES):
-        own = below(skeleton, {skeleton.index(name) for name, _ in found.points[foot]})
-        depths.append(max(float(rest[toe] @ up) - float(heights[sorted(own)].min()), 0.0))
+        own = skeleton.below(*(skeleton.index(name) for name, _ in found.points[foot]))
+        depths.append(max(float(rest[toe] @ up) - float(heights[own].min()), 0.0))
     return min(float(np.mean(depths)), 0.06)
 
 

@@ -97,12 +97,8 @@ class Fidelity:
             over.append((worst, f"{what} {seen.median:.1f} degrees off (95 %: {seen.high:.0f})"))
         for name, seen in self.places.items():
             off = min(seen.median, self.by_leg[name].median)
-            over.append(
-                (
-                    off / (PLACES_CM if name == "all" else PLACE_CM),
-                    f"{'all places' if name == 'all' else name} {off:.1f} cm off",
-                )
-            )
+            what, limit = ("all places", PLACES_CM) if name == "all" else (name, PLACE_CM)
+            over.append((off / limit, f"{what} {off:.1f} cm off"))
         return [text for worst, text in sorted(over, reverse=True) if worst >= 1]
 
 

@@ -22,9 +22,9 @@ from motionloom.skeleton import Skeleton
 Array = NDArray[np.float64]
 HandPose = Literal["relaxed", "fist", "flat", "as-is"]
 POSES: tuple[str, ...] = get_args(HandPose)
-_WORDS = ("thumb", "index", "middle", "ring", "pinky", "pinkie", "little", "finger", "mid")
-_NO_PHALANX = ("metacarpal", "inhand", "palm", "target", "pole", "_ik", "twist", "slot")
-_ORDER = {"index": 1, "mid": 2, "middle": 2, "ring": 3, "pinky": 4, "pinkie": 4, "little": 4}
+_WORDS = "thumb index middle ring pinky pinkie little finger mid"
+_NO_PHALANX = "metacarpal inhand palm target pole _ik twist slot"
+_ORDER = ("index", "mid middle", "ring", "pinky pinkie little")
 # Degrees by which knuckle, middle and end joint bend, of the finger next to the thumb and of the little finger.
 _BENDS = {
     "relaxed": ((16, 26, 12), (34, 38, 20)),
@@ -83,7 +83,8 @@ def _hands(body: Body) -> list[_Hand]:
 def _read_hand(body: Body, side: int) -> _Hand | None:
     """The left (0) or the right (1) hand; None where it has no fingers."""
     skeleton = body.skeleton
-    chains = _chains(skeleton, _below(skeleton, body.drivers[18 + side]))
+    elbow = body.drivers[18 + side]
+    chains = _chains(skeleton, [] if elbow is None else skeleton.below(elbow)[1:])
     thumb = _thumb_of(skeleton, chains, body.rest[20 + side])
     fingers = [chain for chain in chains if chain != thumb]
     if not fingers:
@@ -104,17 +105,9 @@ def _read_hand(body: Body, side: int) -> _Hand | None:
     return _Hand(tuple(fingers), thumb, along, across, palm)
 
 
-def _below(skeleton: Skeleton, joint: int | None) -> set[int]:
-    found: set[int] = set() if joint is None else {joint}
-    for k, parent in enumerate(skeleton.parents):
-        if parent in found:
-            found.add(k)
-    return found - {joint}
-
-
-def _chains(skeleton: Skeleton, below: set[int]) -> list[tuple[int, ...]]:
+def _chains(skeleton: Skeleton, below: list[int]) -> list[tuple[int, ...]]:
     """The joints of each finger that can turn, from the index (or the first in number) to the little finger."""
-    named = {j for j in sorted(below) if j not in skeleton.ends and _word(skeleton.names[j])}
+    named = {j for j in below if j not in skeleton.ends and _word(skeleton.names[j])}
     chains: list[tuple[int, ...]] = []
     for top in sorted(named):
         if skeleton.parents[top] in named:
@@ -130,15 +123,18 @@ def _chains(skeleton: Skeleton, below: set[int]) -> list[tuple[int, ...]]:
 def _word(name: str) -> str:
     """Which finger a joint's name speaks of; nothing for bones of the palm and helpers."""
     low = name.lower()
-    if any(word in low for word in _NO_PHALANX):
+    if any(word in low for word in _NO_PHALANX.split()):
         return ""
-    return next((word for word in _WORDS if word in low), "")
+    return next((word for word in _WORDS.split() if word in low), "")
 
 
 def _rank(name: str) -> float:
     word = _word(name)
     number = re.search(r"finger\D*(\d)", name.lower())
-    return float(_ORDER.get(word, 0)) if word != "finger" else 10 + (int(number.group(1)) if number else 0)
+    if word == "finger":
+        return 10 + (int(number.group(1)) if number else 0)
+    places = (place for place, words in enumerate(_ORDER, start=1) if word in words.split())
+    return float(next(places, 0))
 
 
 def _thumb_of(skeleton: Skeleton, chains: list[tuple[int, ...]], wrist: Array) -> tuple[int, ...]:

@@ -6,7 +6,6 @@ Bandai Namco's BVH) have tables; everything else is found by names (`names`), an
 shape of the tree (`topology`). A user may override any joint.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.reading import read_bytes
+from motionloom.reading import read_json
 from motionloom.retarget.names import Parts, parts_by_name, read_word
 from motionloom.retarget.topology import common_ancestor, is_above, parts_by_shape, path_down
 from motionloom.skeleton import SMPL22, Skeleton
@@ -58,7 +57,9 @@ def _driver(skeleton: Skeleton, joints: list[int]) -> int | None:
         return None if joints[0] in skeleton.ends else joints[0]
     lowest = max(joints)
     others = [j for j in joints if j != lowest]
-    return skeleton.parents[lowest] if all(is_above(skeleton, j, lowest) for j in others) else None
+    if all(is_above(skeleton, j, lowest) for j in others):
+        return skeleton.parents[lowest]
+    return None
 
 
 def joint_map(skeleton: Skeleton, override: Override | None = None) -> JointMap:
@@ -67,7 +68,8 @@ def joint_map(skeleton: Skeleton, override: Override | None = None) -> JointMap:
     ``override`` replaces single joints or all of them. Raises `MotionloomError` naming the joints that could not
     be found or that the override names wrongly.
     """
-    named = {part: {joint: 1.0} for part, joint in skeleton.humanoid.items() if joint in skeleton.names}
+    stated = skeleton.humanoid.items()
+    named = {part: {joint: 1.0} for part, joint in stated if joint in skeleton.names}
     given = named | _read_override(skeleton, override)
     if set(given) >= set(SMPL22.names):
         found: dict[str, dict[str, float]] = {}
@@ -158,7 +160,9 @@ def _missing(skeleton: Skeleton, parts: Parts) -> list[str]:
 def _points(skeleton: Skeleton, parts: Parts) -> dict[str, dict[str, float]]:
     name = skeleton.names
     points = {part: {name[parts[part]]: 1.0} for part in _NEEDED if part in parts}
-    points |= {part: _hand_point(skeleton, parts, part) for part in _NEEDED if part not in parts}
+    for part in (part for part in _NEEDED if part not in parts):  # no joint is the hand: the middle of its bones
+        palm = _palm(skeleton, parts, part)
+        points[part] = {name[j]: 1.0 / len(palm) for j in palm}
     pelvis, chest, spine, neck, head = _trunk(skeleton, parts)
     points["pelvis"] = {name[pelvis]: 1.0}
     points |= _spine_points(skeleton, pelvis, spine, neck)
@@ -206,13 +210,8 @@ def _spine_top(skeleton: Skeleton, chest: int) -> int:
     return top
 
 
-def _hand_point(skeleton: Skeleton, parts: Parts, part: str) -> dict[str, float]:
-    """Where no joint is the hand: the middle of what hangs on the forearm, such as the bones of the palm."""
-    below = _palm(skeleton, parts, part)
-    return {skeleton.names[j]: 1.0 / len(below) for j in below}
-
-
 def _palm(skeleton: Skeleton, parts: Parts, part: str) -> list[int]:
+    """What hangs on the forearm where no joint is the hand."""
     side, _, kind = part.partition("_")
     elbow = parts.get(f"{side}_elbow")
     return list(skeleton.children(elbow)) if kind == "wrist" and elbow is not None else []
@@ -263,19 +262,10 @@ def _collar_point(skeleton: Skeleton, parts: Parts, side: str, *, neck: int, che
 def _read_override(skeleton: Skeleton, override: Override | None) -> dict[str, dict[str, float]]:
     if override is None:
         return {}
-    data = _load_json(Path(override)) if isinstance(override, str | Path) else override
+    data = read_json(override, "a joint map") if isinstance(override, str | Path) else override
     if not isinstance(data, Mapping):
         raise MotionloomError(f'a joint map is an object such as {{"left_knee": "Shin"}}; got {type(data).__name__}')
     return {str(part): _check_point(skeleton, str(part), value) for part, value in data.items()}
-
-
-def _load_json(path: Path) -> object:
-    try:
-        return json.loads(read_bytes(path, max_bytes=1_000_000).decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, MotionloomError):
-            raise
-        raise MotionloomError(f"{path} cannot be read as a joint map in JSON: {error}") from None
 
 
 def _check_apart(points: Mapping[str, Mapping[str, float]]) -> None:

@@ -21,6 +21,19 @@ _TABLES = {
 NAMED = ("smpl22", *_TABLES)
 
 
+def joint_names(name: str) -> list[str]:
+    """What a named skeleton other than ``smpl22`` calls the joints of SMPL, in their order."""
+    head, _, table = _TABLES[name].partition("|")
+    sides, words = head[1:].split(), iter(table.split())
+    names: list[str] = []
+    word = ""
+    for joint in SMPL22.names:
+        if not joint.startswith("right_"):
+            word = next(words)
+        names.append(word.format(sides[joint.startswith("right_")]))
+    return names
+
+
 def named_skeleton(name: str) -> Skeleton:
     """``smpl22``, ``mixamo``, ``unreal`` (with its root bone on the ground), ``vrm`` or ``rigify``.
 
@@ -30,14 +43,7 @@ def named_skeleton(name: str) -> Skeleton:
         return SMPL22
     if name not in _TABLES:
         raise MotionloomError(f"the skeletons with a name are {', '.join(NAMED)}; got {name!r}")
-    head, _, table = _TABLES[name].partition("|")
-    sides, words = head[1:].split(), iter(table.split())
-    names: list[str] = []
-    word = ""
-    for joint in SMPL22.names:
-        if not joint.startswith("right_"):
-            word = next(words)
-        names.append(word.format(sides[joint.startswith("right_")]))
+    names = joint_names(name)
     pairs = list(SMPL22.mirror_pairs())
     offsets = (SMPL22.offsets + SMPL22.offsets[pairs] * [-1.0, 1.0, 1.0]) / 2
     offsets[0, 1] = -sum(offsets[j, 1] for j in (1, 4, 7, 10))

@@ -12,28 +12,24 @@ Parts = dict[str, int]
 """Body part, such as ``left_knee`` or ``pelvis``, to joint number."""
 
 _TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
-_LEFT, _RIGHT = {"left", "l", "lt", "lft"}, {"right", "r", "rt", "rgt"}
-_PREFIXES = {"bip", "bip001", "biped", "mixamorig", "cc", "rl", "base", "armature", "character", "skeleton", "skel"}
-_FILLERS = {"robot", "jnt", "joint", "bone", "bn", "def", "org", "rig", "valve", "sim", "avg", "c", "j", "m", "f"}
-_NOISE = _PREFIXES | _FILLERS
-_HELPERS = {"twist", "roll", "ik", "pole", "end", "nub", "tip", "site", "target", "effector", "share", "corrective"}
+_MARKS = {"left": "left lft lt l", "right": "right rgt rt r"}
+_NOISE = """bip bip001 biped mixamorig cc rl base armature character skeleton skel
+robot jnt joint bone bn def org rig valve sim avg c j m f"""
+_HELPERS = "twist roll ik pole end nub tip site target effector share corrective"
 
 # Words of each part in order of preference: an earlier word wins where a skeleton has several.
-_SIDED: dict[str, tuple[str, ...]] = {
-    "hip": ("upleg", "upperleg", "thigh", "femur", "hip"),
-    "knee": ("lowerleg", "lowleg", "loleg", "shin", "calf", "tibia", "knee", "leg"),
-    "ankle": ("ankle", "foot"),
-    "foot": ("toebase", "toe", "toes", "ball", "foot"),
-    "collar": ("clavicle", "collar", "collarbone", "innershoulder", "shoulder"),
-    "shoulder": ("upperarm", "uparm", "humerus", "shldr", "arm", "shoulder"),
-    "elbow": ("lowerarm", "lowarm", "loarm", "forearm", "elbow", "radius"),
-    "wrist": ("wrist", "hand"),
+_SIDED = {
+    "hip": "upleg upperleg thigh femur hip",
+    "knee": "lowerleg lowleg loleg shin calf tibia knee leg",
+    "ankle": "ankle foot",
+    "foot": "toebase toe toes ball foot",
+    "collar": "clavicle collar collarbone innershoulder shoulder",
+    "shoulder": "upperarm uparm humerus shldr arm shoulder",
+    "elbow": "lowerarm lowarm loarm forearm elbow radius",
+    "wrist": "wrist hand",
 }
-_MIDDLE: dict[str, tuple[str, ...]] = {
-    "pelvis": ("pelvis", "hips", "hip", "lowertorso"),
-    "neck": ("neck", "lowerneck", "neckbase"),
-    "head": ("head",),
-}
+_MIDDLE = {"pelvis": "pelvis hips hip lowertorso", "neck": "neck lowerneck neckbase", "head": "head"}
+_WORDS = {word for words in (*_SIDED.values(), *_MIDDLE.values()) for word in words.split()}
 
 
 def _tokens(name: str) -> list[str]:
@@ -41,37 +37,36 @@ def _tokens(name: str) -> list[str]:
     return [t.lower() for t in _TOKEN.findall(bare)]
 
 
-def _words() -> set[str]:
-    return {w for words in (*_SIDED.values(), *_MIDDLE.values()) for w in words}
-
-
 def _side(tokens: list[str]) -> tuple[str, list[str]]:
     """``left``, ``right`` or ``middle`` and the tokens that remain."""
-    for side, marks in (("left", _LEFT), ("right", _RIGHT)):
-        if any(t in marks for t in tokens):
-            return side, [t for t in tokens if t not in marks]
+    for side, marks in _MARKS.items():
+        if any(t in marks.split() for t in tokens):
+            return side, [t for t in tokens if t not in marks.split()]
     for i, token in enumerate(tokens):  # run together, as in lfemur or rightupleg
-        for side, marks in (("left", _LEFT), ("right", _RIGHT)):
-            for mark in sorted(marks, key=len, reverse=True):
-                if token.startswith(mark) and token[len(mark) :] in _words():
+        for side, marks in _MARKS.items():
+            for mark in marks.split():  # the longest first
+                if token.startswith(mark) and token[len(mark) :] in _WORDS:
                     return side, [*tokens[:i], token[len(mark) :], *tokens[i + 1 :]]
     return "middle", tokens
+
+
+def _plain(tokens: list[str]) -> str:
+    return "".join(t for t in tokens if not t.isdigit() and t not in _NOISE.split())
 
 
 def read_name(name: str) -> tuple[str, str]:
     """Side and word of one joint name: ``mixamorig:LeftUpLeg`` -> ``("left", "upleg")``; helpers give ``""``."""
     side, tokens = _side(_tokens(name))
-    if any(t in _HELPERS for t in tokens):
+    if not set(tokens).isdisjoint(_HELPERS.split()):
         return side, ""
     numbers = [t for t in tokens if t.isdigit() and t not in ("0", "00", "1", "01")]
-    kept = [t for t in tokens if not t.isdigit() and t not in _NOISE]
-    return side, "" if numbers else "".join(kept)
+    return side, "" if numbers else _plain(tokens)
 
 
 def read_word(name: str) -> str:
     """The word of a joint's name without side and number: ``DEF-spine.003`` -> ``spine``."""
     _, tokens = _side(_tokens(name))
-    return "".join(t for t in tokens if not t.isdigit() and t not in _NOISE)
+    return _plain(tokens)
 
 
 def parts_by_name(skeleton: Skeleton) -> Parts:
@@ -82,7 +77,7 @@ def parts_by_name(skeleton: Skeleton) -> Parts:
             found.setdefault(read_name(skeleton.names[j]), j)  # parents come first: the upper of two wins
     parts: Parts = {}
     for part, words in _MIDDLE.items():
-        joint = next((found["middle", w] for w in words if ("middle", w) in found), None)
+        joint = next((found["middle", w] for w in words.split() if ("middle", w) in found), None)
         if joint is not None:
             parts[part] = joint
     for side in ("left", "right"):
@@ -98,26 +93,22 @@ def _apart(skeleton: Skeleton, parts: Parts) -> Parts:
         return parts
     for part, joint in zip(("left_hip", "right_hip"), hips):
         assert joint is not None
-        alike = [
-            j for j in skeleton.children(joint) if read_name(skeleton.names[j]) == read_name(skeleton.names[joint])
-        ]
+        own = read_name(skeleton.names[joint])
+        alike = [j for j in skeleton.children(joint) if read_name(skeleton.names[j]) == own]
         parts[part] = alike[0] if alike else joint
     return parts
 
 
-def _carries(skeleton: Skeleton, joint: int) -> bool:
-    return any(child not in skeleton.ends for child in skeleton.children(joint))
-
-
 def _sided(skeleton: Skeleton, side: str, found: dict[tuple[str, str], int]) -> Parts:
     here = {word: j for (s, word), j in found.items() if s == side}
-    limb = {part: next((here[w] for w in words if w in here), None) for part, words in _SIDED.items()}
+    limb = {part: next((here[w] for w in words.split() if w in here), None) for part, words in _SIDED.items()}
     if limb["foot"] is not None and limb["foot"] == limb["ankle"]:
         limb["foot"] = None  # "foot" is the toe joint only where an "ankle" stands above it
     if limb["collar"] is not None and limb["collar"] == limb["shoulder"]:
         limb["collar"] = None  # "shoulder" is the collar bone only where an upper arm hangs on it
     wrist, hand = here.get("wrist"), here.get("hand")
-    if wrist is not None and hand is not None and skeleton.parents[hand] == wrist and _carries(skeleton, hand):
+    carries = hand is not None and not skeleton.ends.issuperset(skeleton.children(hand))
+    if wrist is not None and hand is not None and skeleton.parents[hand] == wrist and carries:
         limb["wrist"] = hand  # a wrist that only ends the forearm: the hand is what turns
     if limb["hip"] is None and "leg" in here and "knee" in here:
         limb["hip"], limb["knee"] = here["leg"], here["knee"]

@@ -13,8 +13,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
-from motionloom.retarget.axes import FEET, TOES
-from motionloom.retarget.measured import mean_rotation
+from motionloom.retarget.axes import FEET, TOES, mean_rotation
 from motionloom.retarget.transfer import joints22, retarget, to_smpl22
 from motionloom.skeleton import Skeleton
 
@@ -56,7 +55,8 @@ def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
     Places do not say how; without it they would turn to how the uniform person holds them, in a blink.
     """
     drivers, rotations = read_body(made.skeleton).drivers, made.rotations.copy()
-    now, was = made.frames(0, known).world_rotations(), old.frames(0, known).world_rotations()
+    now = made.frames(0, known).world_rotations()
+    was = old.frames(0, known).world_rotations()
     for joint in (drivers[leaf] for leaf in LEAVES):
         if joint is not None and drivers.count(joint) == 1:
             apart = mean_rotation(rot.multiply(rot.inverse(now[:, joint]), was[:, joint]), np.ones(known))
@@ -93,7 +93,9 @@ def _carrier(skeleton: Skeleton) -> int:
 def place_of(motion: Motion) -> Array:
     """(frames, 3) what carries the way through the world."""
     carrier = 0 if motion.translations is None else _carrier(motion.skeleton)
-    return motion.root if carrier == 0 or motion.translations is None else motion.translations[:, carrier]
+    if carrier == 0 or motion.translations is None:
+        return motion.root
+    return motion.translations[:, carrier]
 
 
 def with_place(motion: Motion, place: Array) -> Motion:

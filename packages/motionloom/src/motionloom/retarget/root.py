@@ -8,7 +8,6 @@ import numpy as np
 
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import Body
-from motionloom.retarget.topology import ancestors
 
 RootMode = Literal["motion", "hips", "in-place"]
 LOW = 0.25
@@ -23,7 +22,7 @@ def ground_root(body: Body) -> int | None:
     heights = body.skeleton.rest_positions()[:, 1]
     soles = float(body.rest[:, 1].min())
     limit = soles + LOW * (float(body.rest[0, 1]) - soles)
-    return next((j for j in ancestors(body.skeleton, pelvis)[1:] if heights[j] < limit), None)
+    return next((j for j in body.skeleton.ancestors(pelvis)[1:] if heights[j] < limit), None)
 
 
 def place_root(motion: Motion, body: Body, mode: RootMode) -> Motion:
@@ -42,7 +41,7 @@ def place_root(motion: Motion, body: Body, mode: RootMode) -> Motion:
         return replace(motion, root=motion.root - way) if mode == "in-place" else motion
     ground = float(body.rest[10:12, 1].mean()) - body.toe_height  # where the soles are at rest
     carried = way if mode == "motion" else np.zeros_like(way)
-    line = ancestors(body.skeleton, pelvis)[::-1]
+    line = body.skeleton.ancestors(pelvis)[::-1]
     above = {j: np.tile(rest[j] - [0.0, ground, 0.0], (len(motion), 1)) for j in line[:-1]}
     for j in line[line.index(root) : -1]:
         above[j] = above[j] + carried

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import FEET, TOES, Body
-from motionloom.retarget.topology import below
 
 Array = NDArray[np.float64]
 _ROUNDS = 3
@@ -25,10 +24,11 @@ def bend_toes(motion: Motion, body: Body) -> Motion:
         return motion
     for foot, toe in zip(FEET, TOES):
         driver = body.drivers[toe]
-        tips = [] if driver is None else sorted(below(body.skeleton, {driver}) - {driver})
+        tips = [] if driver is None else body.skeleton.below(driver)[1:]
         if driver is not None and driver > 0 and driver != body.drivers[foot] and tips:
+            left = rot.rotate(body.frames[toe], np.eye(3)[1])
             for _ in range(_ROUNDS):
-                motion = _bent(motion, driver, tips, left=rot.rotate(body.frames[toe], np.eye(3)[1]))
+                motion = _bent(motion, driver, tips, left=left)
     return motion
 
 
@@ -39,7 +39,8 @@ def _bent(motion: Motion, toe: int, tips: list[int], *, left: Array) -> Motion:
     lengths = np.maximum(np.linalg.norm(bones, axis=-1), 1e-9)
     lowest = np.minimum(-places[:, toe, 1], 0.0)[:, None]
     wanted = np.arcsin(np.clip(lowest / lengths, -1.0, 1.0))
-    lack = np.where(lengths > 1e-6, wanted - np.arcsin(np.clip(bones[..., 1] / lengths, -1.0, 1.0)), 0.0)
+    slopes = np.arcsin(np.clip(bones[..., 1] / lengths, -1.0, 1.0))
+    lack = np.where(lengths > 1e-6, wanted - slopes, 0.0)
     angle = np.maximum(lack.max(axis=1), 0.0)
     if not angle.any():
         return motion

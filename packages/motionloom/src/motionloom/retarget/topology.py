@@ -1,6 +1,5 @@
 """Finding a body in a tree of joints by its shape: two legs go down, a spine goes up, arms branch off."""
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -10,67 +9,57 @@ from motionloom.retarget.names import Parts
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
+_Pair = tuple[list[int], list[int]]
 _MOST_LIMBS = 32
 """On one joint; of more the longest are looked at."""
 
 
-def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint, its parent and so on up to the root."""
-    line = [joint]
-    while line[-1] != 0:
-        line.append(skeleton.parents[line[-1]])
-    return line
-
-
 def is_above(skeleton: Skeleton, upper: int, lower: int) -> bool:
     """Whether ``upper`` is ``lower`` or one of its ancestors."""
-    return upper in ancestors(skeleton, lower)
+    return upper in skeleton.ancestors(lower)
 
 
 def common_ancestor(skeleton: Skeleton, joints: list[int]) -> int:
     """The lowest joint that is above all the given ones."""
-    return max(set.intersection(*(set(ancestors(skeleton, j)) for j in joints)))
+    return max(set.intersection(*(set(skeleton.ancestors(j)) for j in joints)))
 
 
 def path_down(skeleton: Skeleton, upper: int, lower: int) -> list[int]:
     """Joints from ``upper`` to ``lower``, both included."""
-    line = ancestors(skeleton, lower)
+    line = skeleton.ancestors(lower)
     return line[: line.index(upper) + 1][::-1]
 
 
 def parts_by_shape(skeleton: Skeleton) -> Parts | None:
     """Body parts of a skeleton in an upright rest pose with the left side at +X (or where the toes say), else None."""
-    rest, ways = skeleton.rest_positions(), _ways(skeleton)
+    shape = _Shape(skeleton)
     branching = [j for j in range(len(skeleton)) if len(skeleton.children(j)) >= 3]
-    arms = {j: found for j in branching if (found := _pair(skeleton, j, ways, rest, down=False))}
+    arms = {j: limbs for j in branching if (limbs := shape.pair(j, down=False))}
     for pelvis in branching:
-        legs = _pair(skeleton, pelvis, ways, rest, down=True)
+        legs = shape.pair(pelvis, down=True)
         if legs is None or not arms:
             continue
-        inside = below(skeleton, {pelvis}) - below(skeleton, {leg[0] for leg in legs})
+        inside = set(skeleton.below(pelvis)).difference(skeleton.below(*(leg[0] for leg in legs)))
         for chest in sorted(inside & arms.keys()):
             if not set(arms[chest][0]) & {*legs[0], *legs[1]}:
-                return _name_parts(skeleton, ways, rest, pelvis, legs, chest=chest, arms=arms[chest])
+                return _name_parts(shape, pelvis, legs, chest, arms[chest])
     return None
 
 
-def below(skeleton: Skeleton, joints: set[int]) -> set[int]:
-    """The given joints and all that hangs on them."""
-    found = set(joints)
-    for j, parent in enumerate(skeleton.parents):
-        if parent in found:
-            found.add(j)
-    return found
+class _Shape:
+    """A skeleton at rest, and the way down from each joint to the tip that lies farthest along the bones."""
 
-
-@dataclass(frozen=True, eq=False)
-class _Ways:
-    """The way down from each joint to the tip that lies farthest along the bones."""
-
-    next: list[int]
-    """The joint below; -1 at a tip."""
-    length: list[float]
-    """Metres from the joint above down to that tip."""
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton, self.rest = skeleton, skeleton.rest_positions()
+        self.next = [-1] * len(skeleton)
+        """The joint below; -1 at a tip."""
+        self.length: list[float] = np.linalg.norm(skeleton.offsets, axis=-1).tolist()
+        """Metres from the joint above down to that tip."""
+        reach = [0.0] * len(skeleton)
+        for j in range(len(skeleton) - 1, 0, -1):
+            parent, self.length[j] = skeleton.parents[j], self.length[j] + reach[j]
+            if self.length[j] > reach[parent] or self.next[parent] < 0:
+                reach[parent], self.next[parent] = self.length[j], j
 
     def down(self, joint: int) -> list[int]:
         """The joints of the way, the given one first."""
@@ -79,63 +68,40 @@ class _Ways:
             line.append(self.next[line[-1]])
         return line
 
-
-def _ways(skeleton: Skeleton) -> _Ways:
-    length, following = np.linalg.norm(skeleton.offsets, axis=-1).tolist(), [-1] * len(skeleton)
-    reach = [0.0] * len(skeleton)
-    for j in range(len(skeleton) - 1, 0, -1):
-        parent, length[j] = skeleton.parents[j], length[j] + reach[j]
-        if length[j] > reach[parent] or following[parent] < 0:
-            reach[parent], following[parent] = length[j], j
-    return _Ways(following, length)
-
-
-def _pair(
-    skeleton: Skeleton, joint: int, ways: _Ways, rest: Array, *, down: bool
-) -> tuple[list[int], list[int]] | None:
-    """Two mirror-like limbs that hang on a joint beside a third branch: legs reach far below it, arms do not."""
-    height = float(np.ptp(rest[:, 1]))
-    long = sorted((j for j in skeleton.children(joint) if ways.length[j] > 0.2 * height), key=lambda j: -ways.length[j])
-    limbs = [line for j in sorted(long[:_MOST_LIMBS]) if len(line := ways.down(j)) >= 3]
-    best: tuple[float, tuple[list[int], list[int]]] | None = None
-    for pair in combinations(limbs, 2):
-        lengths = [ways.length[limb[0]] for limb in pair]
-        drops = [float(rest[joint, 1] - rest[limb[-1], 1]) for limb in pair]
-        apart = float(np.linalg.norm(rest[pair[0][-1]] - rest[pair[1][-1]]))
-        alike = abs(lengths[0] - lengths[1]) < 0.25 * max(lengths) and abs(drops[0] - drops[1]) < 0.15 * height
-        if alike and apart > 0.05 * height and (min(drops) > 0.3 * height) == down:
-            best = max(best, (sum(lengths), pair), key=lambda x: x[0]) if best else (sum(lengths), pair)
-    return best[1] if best else None
+    def pair(self, joint: int, *, down: bool) -> _Pair | None:
+        """Two mirror-like limbs that hang on a joint beside a third branch: legs reach far below it, arms do not."""
+        rest, length, height = self.rest, self.length, float(np.ptp(self.rest[:, 1]))
+        long = sorted((j for j in self.skeleton.children(joint) if length[j] > 0.2 * height), key=lambda j: -length[j])
+        limbs = [line for j in sorted(long[:_MOST_LIMBS]) if len(line := self.down(j)) >= 3]
+        best: tuple[float, _Pair] | None = None
+        for pair in combinations(limbs, 2):
+            lengths = [length[limb[0]] for limb in pair]
+            drops = [float(rest[joint, 1] - rest[limb[-1], 1]) for limb in pair]
+            apart = float(np.linalg.norm(rest[pair[0][-1]] - rest[pair[1][-1]]))
+            alike = abs(lengths[0] - lengths[1]) < 0.25 * max(lengths) and abs(drops[0] - drops[1]) < 0.15 * height
+            if alike and apart > 0.05 * height and (min(drops) > 0.3 * height) == down:
+                best = max(best or (0.0, pair), (sum(lengths), pair), key=lambda x: x[0])
+        return best[1] if best else None
 
 
-def _name_parts(
-    skeleton: Skeleton,
-    ways: _Ways,
-    rest: Array,
-    pelvis: int,
-    legs: tuple[list[int], list[int]],
-    *,
-    chest: int,
-    arms: tuple[list[int], list[int]],
-) -> Parts | None:
+def _name_parts(shape: _Shape, pelvis: int, legs: _Pair, chest: int, arms: _Pair) -> Parts | None:
+    skeleton = shape.skeleton
     leg_joints = [_limb(skeleton, leg) for leg in legs]
     arm_joints = [_limb(skeleton, arm) for arm in arms]
     tops = [j for j in skeleton.children(chest) if j not in (arms[0][0], arms[1][0])]
     if None in leg_joints or None in arm_joints or not tops:
         return None
-    found = [chain for chain in leg_joints if chain], [chain for chain in arm_joints if chain]
-    parts: Parts = {"pelvis": pelvis} | _sides(rest, *found)
+    limbs = [chain for chain in leg_joints if chain], [chain for chain in arm_joints if chain]
+    parts: Parts = {"pelvis": pelvis} | _sides(shape.rest, *limbs)
     for side in ("left", "right"):
         above = skeleton.parents[parts[f"{side}_shoulder"]]
         if above != chest:
             parts[f"{side}_collar"] = above
-    top = max(tops, key=lambda j: float(rest[ways.down(j)[-1], 1]))
-    line = [j for j in ways.down(top) if j not in skeleton.ends]
+    top = max(tops, key=lambda j: float(shape.rest[shape.down(j)[-1], 1]))
+    line = [j for j in shape.down(top) if j not in skeleton.ends]
     if not line:
         return None
-    parts["neck"] = line[0]
-    parts["head"] = line[min(1, len(line) - 1)]
-    return parts
+    return parts | {"neck": line[0], "head": line[min(1, len(line) - 1)]}
 
 
 def _sides(rest: Array, legs: list[list[int]], arms: list[list[int]]) -> Parts:

@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import smoothstep
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import Body, read_body
-from motionloom.retarget.arms import reach, shoulders_moved, shrug
-from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, SPINE, TOES, trunk
+from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, LEG_JOINTS, SPINE, TOES, beside, trunk, unit
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
-from motionloom.retarget.limbs import aim, bend, placed
+from motionloom.retarget.limbs import aim, bend_limb, placed, reach, shoulders_moved, shrug
 from motionloom.retarget.root import RootMode, place_root
-from motionloom.retarget.topology import ancestors
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
@@ -82,10 +81,8 @@ def retarget(
         source = _read_source(motion, source_map)
     if not _LEGS[0] < body.leg < _LEGS[1]:
         size = _LEG / body.leg
-        made = retarget(motion, target.scaled(size), source_map=source_map, target_map=target_map, root=root).scaled(
-            1 / size
-        )
-        return replace(made, skeleton=target)
+        made = retarget(motion, target.scaled(size), source_map=source_map, target_map=target_map, root=root)
+        return replace(made.scaled(1 / size), skeleton=target)
     shrugs = not any(b.drivers[j] is None for b in (source, body) for j in COLLARS)
     pose = _read_pose(_y_up(motion, source), source, shrugs=shrugs)
     stance = read_stance(pose.places, motion.fps)
@@ -95,19 +92,22 @@ def retarget(
     goals = _scale(pose, stance, ratio=body.leg / source.leg, toe_height=body.toe_height)
     if source.broad or body.broad:
         out = body.broad - source.broad * body.leg / source.leg
-        goals = _spread(goals, out * _smooth_left(pose, motion.fps))
+        left = _smooth(rot.rotate(pose.frames[:, 0], np.eye(3)[1]), max(1, round(0.4 * motion.fps)))
+        goals = _spread(goals, out * left)  # so smooth in time that planted feet hardly slide
     world = _orient(pose, body)
     if not shrugs:
         world = reach(world, pose.shoulders, body)
     elif source.known and body.known:
-        world = shrug(world, pose.frames[:, CHEST], pose.shoulders * source.arm / source.breadth, body)
+        moved = pose.shoulders * source.arm / source.breadth
+        world = shrug(world, pose.frames[:, CHEST], moved, body)
     made = _place(world, goals, body, motion.fps)
     return made if root is None else place_root(made, body, root)
 
 
 def _read_source(motion: Motion, override: Override | None) -> Body:
     """The body of a motion, measured from the motion itself where its rest pose is no pose."""
-    return read_body(motion.skeleton, override, poses=Poses(motion.root, motion.rotations, motion.translations))
+    poses = Poses(motion.root, motion.rotations, motion.translations)
+    return read_body(motion.skeleton, override, poses=poses)
 
 
 # 1. Read -------------------------------------------------------------------------------------------------------------
@@ -148,7 +148,8 @@ def _read_pose(motion: Motion, source: Body, *, shrugs: bool) -> _Pose:
     moved = shoulders_moved(motion.positions(), world, source)
     line = trunk(places)
     if not shrugs and (chest := source.drivers[CHEST]) is not None:
-        lifted = rot.rotate(rot.multiply(world[:, chest], source.frames[CHEST])[:, None], moved) * source.arm
+        turned = rot.multiply(world[:, chest], source.frames[CHEST])
+        lifted = rot.rotate(turned[:, None], moved) * source.arm
         line = line - lifted.mean(axis=1)
     return _Pose(places, frames, _hips(places, frames, source), moved, line)
 
@@ -170,10 +171,7 @@ def _y_up(motion: Motion, source: Body) -> Motion:
     tall = (places[:, HEAD] - places[:, FEET].mean(axis=1)).mean(axis=0)
     if float(tall @ source.up) < 2 * abs(float(tall[1])):
         return motion
-    turn = rot.shortest_arc(source.up, np.eye(3)[1])
-    rotations = motion.rotations.copy()
-    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
-    return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)
+    return motion.turned(rot.shortest_arc(source.up, np.eye(3)[1]))
 
 
 def _borrowed(above: Array, joint: int) -> tuple[Array, Array]:
@@ -225,7 +223,7 @@ def _scale(pose: _Pose, stance: Stance, *, ratio: float, toe_height: float) -> _
         ankles=(ankles - under) * ratio + lift,
         toes=(toes - under) * ratio + lift,
         flat=stance.flat,
-        low=_near_ground(toes[..., 1:2] - under[..., 1:2]),
+        low=smoothstep((0.12 - (toes[..., 1:2] - under[..., 1:2])) / 0.07),
         forward=facing * np.array([1.0, 0.0, 1.0]),
         poles=_knee_poles(pose),
     )
@@ -241,11 +239,6 @@ def _spread(goals: _Goals, left: Array) -> _Goals:
     return replace(goals, ankles=goals.ankles + both, toes=goals.toes + both)
 
 
-def _smooth_left(pose: _Pose, fps: float) -> Array:
-    """(frames, 3) where the left of the pelvis is, so smooth in time that planted feet hardly slide."""
-    return _smooth(rot.rotate(pose.frames[:, 0], np.eye(3)[1]), max(1, round(0.4 * fps)))
-
-
 def _smooth(values: Array, reach: int) -> Array:
     """(frames, n) with each frame the mean of those up to ``reach`` away, near ones more."""
     kernel = np.hanning(2 * reach + 3)[1:-1]
@@ -254,23 +247,15 @@ def _smooth(values: Array, reach: int) -> Array:
     return np.asarray(np.stack(smooth, axis=-1), dtype=np.float64)
 
 
-def _near_ground(height: Array) -> Array:
-    """1 up to 5 cm, 0 from 12 cm, smooth between."""
-    x = np.clip((0.12 - height) / 0.07, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
-
-
 def _knee_poles(pose: _Pose) -> Array:
     """Where the knee stands out from the line hip to ankle; on a nearly straight leg, ahead of its hinge."""
     poles = []
-    for hip, knee, ankle in ((1, 4, 7), (2, 5, 8)):
-        line = pose.places[:, ankle] - pose.places[:, hip]
-        length = np.linalg.norm(line, axis=-1, keepdims=True)
-        line = line / np.maximum(length, 1e-9)
-        out = pose.places[:, knee] - pose.places[:, hip]
-        out = out - (out * line).sum(-1, keepdims=True) * line
-        ahead = np.cross(line, rot.rotate(pose.frames[:, hip], np.eye(3)[1]))
-        poles.append(out + 0.03 * length * ahead)
+    for leg in LEG_JOINTS:
+        hip, knee, ankle = (pose.places[:, joint] for joint in leg)
+        line = unit(ankle - hip)
+        length = np.linalg.norm(ankle - hip, axis=-1, keepdims=True)
+        ahead = np.cross(line, rot.rotate(pose.frames[:, leg[0]], np.eye(3)[1]))
+        poles.append(beside(knee - hip, line) + 0.03 * length * ahead)
     return np.stack(poles, axis=1)
 
 
@@ -281,7 +266,8 @@ def _orient(pose: _Pose, body: Body) -> Array:
     """(frames, joints, 4) world orientation of the target's joints, before the legs are set."""
     skeleton = body.skeleton
     world = np.tile(rot.IDENTITY, (len(pose.places), len(skeleton), 1))
-    first = {driver: j for j, driver in reversed(list(enumerate(body.drivers))) if driver is not None}
+    backwards = list(enumerate(body.drivers))[::-1]
+    first = {driver: j for j, driver in backwards if driver is not None}
     for k in range(len(skeleton)):
         if k not in first:
             world[:, k] = world[:, skeleton.parents[k]] if k else rot.IDENTITY
@@ -303,10 +289,9 @@ def _straighten(world: Array, body: Body, wanted: Array) -> Array:
     skeleton. Pelvis, collar bones, neck and limbs keep their orientations.
     """
     turning = {body.drivers[j]: j for j in reversed(SPINE) if body.drivers[j] not in (None, body.drivers[0])}
-    wanted = wanted / np.maximum(np.linalg.norm(wanted, axis=-1, keepdims=True), 1e-9)
+    wanted = unit(wanted)
     for _ in range(_ROUNDS if turning else 0):
-        now = trunk(body.places(placed(body.skeleton, world), world))
-        now = now / np.maximum(np.linalg.norm(now, axis=-1, keepdims=True), 1e-9)
+        now = unit(trunk(body.places(placed(body.skeleton, world), world)))
         if float((now * wanted).sum(axis=-1).min()) > _ALIGNED:
             break
         for joint in turning.values():
@@ -339,12 +324,8 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
         root, places = root + lift, places + lift
     drop = _drop(places, ankles, body)
     root, places = root - drop, places - drop[:, None]
-    for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
-        middle, end = bend(
-            places[:, hip], ankles[:, side], goals.poles[:, side], upper=body.bone(hip), lower=body.bone(knee)
-        )
-        world = aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
-        world = aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
+    for side, leg in enumerate(LEG_JOINTS):
+        world = bend_limb(world, body, leg, places, ankles[:, side], goals.poles[:, side])
     return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
 
 
@@ -356,21 +337,12 @@ def move_feet(motion: Motion, shift: Array) -> Motion:
     """
     body, world = read_body(motion.skeleton), motion.world_rotations()
     places = body.places(motion.positions(), world)
-    for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
-        line = places[:, ankle] - places[:, hip]
-        line = line / np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9)
-        out = places[:, knee] - places[:, hip]
-        out = out - (out * line).sum(-1, keepdims=True) * line
+    for side, leg in enumerate(LEG_JOINTS):
+        hip, knee, ankle = (places[:, joint] for joint in leg)
+        out = beside(knee - hip, unit(ankle - hip))
         lack = (0.01 - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
-        middle, end = bend(
-            places[:, hip],
-            places[:, ankle] + shift[:, side],
-            out + lack * (places[:, TOES[side]] - places[:, ankle]),
-            upper=body.bone(hip),
-            lower=body.bone(knee),
-        )
-        world = aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
-        world = aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
+        pole = out + lack * (places[:, TOES[side]] - ankle)
+        world = bend_limb(world, body, leg, places, ankle + shift[:, side], pole)
     return replace(motion, rotations=_locals(motion.skeleton, world))
 
 
@@ -399,12 +371,13 @@ def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Arr
     rest. A foot that the source has below it, such as down a stair, may be as low there.
     """
     rest = body.skeleton.rest_positions()
-    floor = min(0.0, *(float(((rest[j] + corners) @ body.up).min()) for j, corners in body.skeleton.soles.items()))
+    lowest = [((rest[j] + corners) @ body.up).min() for j, corners in body.skeleton.soles.items()]
+    floor = min(0.0, *map(float, lowest))
     joints = placed(body.skeleton, world)
     lack = np.zeros(ankles.shape[:2])
     for side, foot in enumerate(FEET):
         driver = body.drivers[foot]
-        own = [j for j in body.skeleton.soles if driver is not None and driver in ancestors(body.skeleton, j)]
+        own = [j for j in body.skeleton.soles if driver in body.skeleton.ancestors(j)]
         for j in own:
             points = rot.rotate(world[:, None, j], body.skeleton.soles[j][None]) + joints[:, None, j]
             under = (points - places[:, None, foot])[..., 1].min(axis=1)
@@ -436,15 +409,11 @@ def _drop(places: Array, ankles: Array, body: Body) -> Array:
         allowed = np.sqrt(np.maximum(reach**2 - flat**2, 0.0))
         need = np.maximum(need, np.where(flat < reach, height - allowed, 0.0))
     need = np.clip(need, 0.0, 0.15)
-    wide = np.max([np.roll(np.pad(need, 3, mode="edge"), s)[3 : 3 + len(need)] for s in range(-3, 4)], axis=0)
-    kernel = np.hanning(9)[1:-1] / np.hanning(9)[1:-1].sum()
-    smooth = np.convolve(np.pad(wide, 3, mode="edge"), kernel, mode="valid")
-    return smooth[:, None] * np.array([0.0, 1.0, 0.0])
+    wide = np.lib.stride_tricks.sliding_window_view(np.pad(need, 3, mode="edge"), 7).max(axis=1)
+    return _smooth(wide[:, None], 3) * np.array([0.0, 1.0, 0.0])
 
 
 def _locals(skeleton: Skeleton, world: Array) -> Array:
-    local = world.copy()
-    parents = list(skeleton.parents[1:])
-    if parents:
-        local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
+    local, parents = world.copy(), list(skeleton.parents[1:])
+    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
     return rot.unroll(rot.normalize(local))

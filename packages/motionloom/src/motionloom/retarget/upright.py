@@ -1,13 +1,11 @@
 """Which way is up in a recording that does not say so: by gravity, by where feet stand, and by the rest pose."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
-from motionloom.retarget.axes import FEET, HEAD, TOES
+from motionloom.retarget.axes import FEET, HEAD, TOES, unit
 from motionloom.retarget.joint_map import Override
 
 TALL = 0.8
@@ -26,8 +24,7 @@ def up_axis(motion: Motion, override: Override | None = None) -> str:
     """
     body, motion = read_body(motion.skeleton, override), motion.thinned(_ENOUGH)
     places = body.places(motion.positions(), motion.world_rotations())
-    tall = places[:, HEAD] - places[:, FEET].mean(axis=1)
-    tall = tall / np.maximum(np.linalg.norm(tall, axis=-1, keepdims=True), 1e-9)
+    tall = unit(places[:, HEAD] - places[:, FEET].mean(axis=1))
     along = (np.abs(tall) > TALL).mean(axis=0)
     if along[2] < OFTEN or tall[:, 2].mean() < 0:
         return "y" if along[1] >= OFTEN or along[1] > along[2] else "y?"
@@ -42,7 +39,4 @@ def up_axis(motion: Motion, override: Override | None = None) -> str:
 
 def stood_up(motion: Motion) -> Motion:
     """From Z up to Y up: a quarter turn of everything about X."""
-    turn = rot.rotvec_to_quat(np.array([-np.pi / 2, 0.0, 0.0]))
-    rotations = motion.rotations.copy()
-    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
-    return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)
+    return motion.turned(rot.rotvec_to_quat(np.array([-np.pi / 2, 0.0, 0.0])))

@@ -16,7 +16,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
-from motionloom.robots.engine import load_mujoco
+from motionloom.robots.engine import load_mujoco, posed
 from motionloom.robots.joints import LEG, SIDES, Parts, find_parts, limb_points
 from motionloom.robots.model import Hinge, Model, check_limits, read_model
 from motionloom.skeleton import SMPL22, Skeleton
@@ -26,6 +26,7 @@ LEGS_M = (0.08, 1.6)
 """Metres of thigh and shin of a robot; outside of it a model is in another unit."""
 _BENT = 0.25
 """Radians by which knees are bent in the pose that a robot prefers, where its file has none of its own."""
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 _KEYS = ("home", "stand", "standing", "default")
 
 
@@ -136,13 +137,11 @@ class _Reading:
             ankle = places[f"{side}_ankle"]
             toe = ankle + 0.8 * (front - ankle)
             places[f"{side}_foot"] = np.array([toe[0], ankle[1], front[2]])
-        skeleton = _skeleton(
-            places, {s: soles[s] - places[f"{s}_ankle"] for s in SIDES}, waist="waist" in self.parts.hinges
-        )
-        model = self._with_sites(places, bodies)
-        notes = (*self.file.notes, *notes)
         corners = {side: soles[side] - places[f"{side}_ankle"] for side in SIDES}
-        return Robot(self.file, self.parts, model, skeleton, self._home(), corners, self._rolls(), notes)
+        model, skeleton = self._with_sites(places, bodies), _skeleton(places, corners)
+        notes = (*self.file.notes, *notes)
+        home, rolls = self._home(), self._rolls()
+        return Robot(self.file, self.parts, model, skeleton, home, corners, rolls, notes)
 
     def _pose(self) -> None:
         mujoco = load_mujoco()
@@ -185,7 +184,8 @@ class _Reading:
                 self.qpos[7 + row] = angle
                 self._pose()
                 elbow = self._centre(f"{side}_elbow")
-                upper, fore = elbow - self._centre(f"{side}_shoulder"), self._hand(side) - elbow
+                upper = elbow - self._centre(f"{side}_shoulder")
+                fore = self._hand(side) - elbow
                 straight.append(float(upper @ fore) / max(float(np.linalg.norm(upper) * np.linalg.norm(fore)), 1e-9))
             best = int(np.argmax(straight))
             near = int(np.argmin(np.abs(angles - before)))
@@ -201,10 +201,7 @@ class _Reading:
 
     def _tip(self, body: int) -> Array:
         """(3,) in a body's frame: the farthest origin of the bodies fixed to it, else the farthest point of its own."""
-        mujoco = load_mujoco()
-
-        model, data = self.file.model, mujoco.MjData(self.file.model)
-        mujoco.mj_kinematics(model, data)
+        model, data = self.file.model, posed(self.file.model)
         fixed = [data.xpos[b] for b in range(model.nbody) if model.body_weldid[b] == body]
         points = np.array(fixed) if len(fixed) > 1 else limb_points(self.file, body)
         away = points - data.xpos[body]
@@ -228,7 +225,8 @@ class _Reading:
         if "waist" in has:
             waist = self._centre("waist")
             share = np.clip(float((waist - hips) @ trunk) / float(trunk @ trunk), 0.15, 0.6)
-            places["spine1"], bodies["spine1"] = np.array([waist[0], hips[1], (hips + share * trunk)[2]]), torso
+            places["spine1"] = np.array([waist[0], hips[1], (hips + share * trunk)[2]])
+            bodies["spine1"] = torso
         places["neck"] = shoulders + 0.15 * trunk
         places["head"] = shoulders + 0.35 * trunk
         bodies["neck"] = bodies["head"] = self.last["neck"].body if "neck" in has else torso
@@ -239,12 +237,7 @@ class _Reading:
 
     def _shared(self, hinges: list[Hinge]) -> int:
         """The lowest body that all of these hang on."""
-        lines = []
-        for hinge in hinges:
-            line = [hinge.parent]
-            while line[-1]:
-                line.append(int(self.file.model.body_parentid[line[-1]]))
-            lines.append(line)
+        lines = [self.file.above(hinge.parent) for hinge in hinges]
         return next(body for body in lines[0] if all(body in line for line in lines))
 
     def _soles(self, bodies: dict[str, int], places: dict[str, Array]) -> tuple[dict[str, Array], list[str]]:
@@ -252,12 +245,14 @@ class _Reading:
         soles, notes = {}, []
         leg = float(np.linalg.norm(places["left_hip"] - places["left_ankle"]))
         for side in SIDES:
-            ankle, points = places[f"{side}_ankle"], self._foot_points(bodies[f"{side}_ankle"])
+            ankle = places[f"{side}_ankle"]
+            points = self._foot_points(bodies[f"{side}_ankle"])
             low = points[points[:, 2] < points[:, 2].min() + 0.02 * leg] if len(points) else points
             if len(low) < 3 or np.ptp(low[:, 0]) < 0.05 * leg:
                 low = ankle + leg * np.array([[-0.08, -0.05, -0.07], [0.2, 0.05, -0.07]])
                 notes = [f"{self.file.path} has no geoms under its ankles; soles are taken to be as on other robots"]
-            (back, right), (front, left) = low[:, :2].min(axis=0), low[:, :2].max(axis=0)
+            (back, right) = low[:, :2].min(axis=0)
+            (front, left) = low[:, :2].max(axis=0)
             ground = float(low[:, 2].min())
             soles[side] = np.array([[x, y, ground] for x in (back, front) for y in (right, left)])
         return soles, notes
@@ -279,7 +274,7 @@ class _Reading:
                 points.append(place + local @ turn.T)
                 continue
             if kind == mujoco.mjtGeom.mjGEOM_BOX:
-                points.append(place + _corners(size) @ turn.T)
+                points.append(place + (_CORNERS * size[:3]) @ turn.T)
                 continue
             half = np.array([0, 0, size[1] if kind != mujoco.mjtGeom.mjGEOM_SPHERE else 0.0])
             ends = np.array([half, -half]) @ turn.T + place
@@ -291,10 +286,11 @@ class _Reading:
         for side in SIDES:
             found[side] = (-np.inf, np.inf)
             for hinge in self.parts.hinges[f"{side}_ankle"]:
-                ahead, row = float(self.data.xaxis[hinge.joint][0]), self.file.hinges.index(hinge)
+                ahead = float(self.data.xaxis[hinge.joint][0])
+                row = self.file.hinges.index(hinge)
                 if abs(ahead) > 0.7:
-                    ends = (np.array([self.file.lower[row], self.file.upper[row]]) - self.qpos[7 + row]) * np.sign(
-                        ahead
+                    ends = np.sign(ahead) * (
+                        np.array([self.file.lower[row], self.file.upper[row]]) - self.qpos[7 + row]
                     )
                     found[side] = (float(ends.min()), float(ends.max()))
         return found
@@ -315,9 +311,8 @@ class _Reading:
         own = {body.id: body for body in self.file.spec.bodies}
         for joint, body in bodies.items():
             turn = rot.inverse(np.array(self.data.xquat[body]))
-            own[body].add_site(
-                name=f"motionloom {joint}", pos=rot.rotate(turn, places[joint] - self.data.xpos[body]), quat=turn
-            )
+            place = rot.rotate(turn, places[joint] - self.data.xpos[body])
+            own[body].add_site(name=f"motionloom {joint}", pos=place, quat=turn)
         return self.file.spec.compile()
 
     def _home(self) -> Array:
@@ -341,47 +336,20 @@ class _Reading:
         return home
 
 
-def _corners(size: Array) -> Array:
-    return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size[:3]
-
-
-_PARENTS = {
-    "left_hip": "pelvis",
-    "right_hip": "pelvis",
-    "spine1": "pelvis",
-    "left_knee": "left_hip",
-    "right_knee": "right_hip",
-    "left_ankle": "left_knee",
-    "right_ankle": "right_knee",
-    "left_foot": "left_ankle",
-    "right_foot": "right_ankle",
-    "neck": "spine1",
-    "head": "neck",
-    "left_shoulder": "spine1",
-    "right_shoulder": "spine1",
-    "left_elbow": "left_shoulder",
-    "right_elbow": "right_shoulder",
-    "left_wrist": "left_elbow",
-    "right_wrist": "right_elbow",
-}
-
-
-def _skeleton(places: dict[str, Array], soles: dict[str, Array], *, waist: bool) -> Skeleton:
+def _skeleton(places: dict[str, Array], soles: dict[str, Array]) -> Skeleton:
     """The skeleton of joints at these places in MuJoCo's world; soles in the frames of the ankles."""
-    names = ["pelvis", *(joint for joint in _PARENTS if waist or joint != "spine1")]
-
-    def above(joint: str) -> str:
-        parent = _PARENTS[joint]
-        return "pelvis" if parent == "spine1" and not waist else parent
-
-    parents = [-1, *(names.index(above(joint)) for joint in names[1:])]
-    offsets = [places["pelvis"], *(places[joint] - places[above(joint)] for joint in names[1:])]
-    ends = frozenset(names.index(f"{side}_foot") for side in SIDES)
+    names = [joint for joint in SMPL22.names if joint in places]
+    parents, offsets = [-1], [places["pelvis"]]
+    for joint in names[1:]:
+        line = [SMPL22.names[j] for j in SMPL22.ancestors(SMPL22.index(joint))]
+        above = next(other for other in line[1:] if other in places)
+        parents.append(names.index(above))
+        offsets.append(places[joint] - places[above])
     return Skeleton(
         tuple(names),
         tuple(parents),
         from_mujoco(np.array(offsets)),
-        ends=ends,
+        ends=frozenset(names.index(f"{side}_foot") for side in SIDES),
         humanoid={name: name for name in names},
         on_floor=True,
         soles={names.index(f"{side}_ankle"): from_mujoco(corners) for side, corners in soles.items()},
@@ -406,10 +374,12 @@ def to_motion(robot: Robot, qpos: np.ndarray, fps: float) -> Motion:
         mujoco.mj_kinematics(robot.model, data)
         places[frame, rows] = from_mujoco(data.site_xpos[sites])
         world[frame, rows] = turns_from_mujoco(rot.matrix_to_quat(data.site_xmat[sites].reshape(-1, 3, 3)))
-    local, moved = world.copy(), np.zeros_like(places)
-    for j, parent in enumerate(skeleton.parents[1:], start=1):
-        local[:, j] = rot.multiply(rot.inverse(world[:, parent]), world[:, j]) if j in rows else rot.IDENTITY
-        moved[:, j] = rot.rotate(rot.inverse(world[:, parent]), places[:, j] - places[:, parent])
-        if j not in rows:
-            moved[:, j] = skeleton.offsets[j]
+    local = world.copy()
+    moved = np.zeros_like(places)
+    parents = list(skeleton.parents[1:])
+    ends = list(skeleton.ends)
+    back = rot.inverse(world[:, parents])
+    local[:, 1:], local[:, ends] = rot.multiply(back, world[:, 1:]), rot.IDENTITY
+    moved[:, 1:] = rot.rotate(back, places[:, 1:] - places[:, parents])
+    moved[:, ends] = skeleton.offsets[ends]
     return Motion(skeleton, fps, places[:, 0], rot.unroll(rot.normalize(local)), moved)

@@ -78,8 +78,7 @@ def put_on_robot(
     poses, reached = solve(robot, targets, avoid=avoid_collisions, watched=EFFECTORS, progress=progress)
     rows = [targets.joints.index(joint) for joint in EFFECTORS]
     errors = np.linalg.norm(reached - targets.places[:, rows], axis=-1)
-    speeds = robot.file.speed if max_speed is None else np.minimum(robot.file.speed, max_speed)
-    return _paced(Clip(fps, poses, targets.planted, errors), speeds)
+    return _paced(Clip(fps, poses, targets.planted, errors), robot.file.speeds(max_speed))
 
 
 def check_settings(fps: float, max_speed: float | None) -> None:
@@ -113,7 +112,7 @@ def sampled(clip: Clip, at: Array, fps: float | None = None) -> Clip:
     poses[:, 3:7] = rot.slerp(clip.qpos[low, 3:7], clip.qpos[high, 3:7], share[:, 0])
     nearest = np.where(share[:, 0] < 0.5, low, high)
     errors = None if clip.errors is None else clip.errors[nearest]
-    return replace(clip, fps=clip.fps if fps is None else fps, qpos=poses, planted=clip.planted[nearest], errors=errors)
+    return Clip(clip.fps if fps is None else fps, poses, clip.planted[nearest], errors, clip.slowed)
 
 
 def velocities(robot: Robot, clip: Clip) -> Array:

@@ -15,3 +15,12 @@ def load_mujoco() -> Any:
     if sys.platform == "linux" and not {"DISPLAY", "MUJOCO_GL"} & set(os.environ):
         os.environ["MUJOCO_GL"] = "egl" if find_library("EGL") else "disabled"
     return importlib.import_module("mujoco")
+
+
+def posed(model: Any, qpos: Any = None) -> Any:
+    """`mujoco.MjData` of a model, whose bodies are where a pose (nq,) puts them, or None the model's own pose."""
+    mujoco = load_mujoco()
+    data = mujoco.MjData(model)
+    data.qpos = data.qpos if qpos is None else qpos
+    mujoco.mj_kinematics(model, data)
+    return data

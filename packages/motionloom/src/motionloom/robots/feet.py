@@ -32,7 +32,7 @@ def plant(places: Array, turns: Array, planted: Flags, sole: Array, fps: float) 
         sole: (4, 3) metres in the ankle's frame: two corners of the heel, two of the toes.
         fps: Frames per second.
     """
-    heel, toes = sole[:2].mean(axis=0), sole[2:].mean(axis=0)
+    heel, toes = heel_and_toes(sole)
     result, turned, held = places.copy(), turns.copy(), np.zeros_like(planted)
     pieces = list(_stances(places, turns, planted, max(2, round(EASE * fps / 2))))
     for start, stop in pieces:
@@ -56,17 +56,18 @@ def plant(places: Array, turns: Array, planted: Flags, sole: Array, fps: float) 
         result[some] = middle + under - rot.rotate(turned[some], pivot)
         held[some] = np.stack([pitch <= 0, pitch >= 0], axis=-1) & planted[some].any(axis=1, keepdims=True)
     _ease(result, turned, places, turns, pieces, fps)
-    return _above_ground(result, turned, sole), turned, held
+    result[:, 2] += np.maximum(-lowest(result, turned, sole), 0.0)
+    return result, turned, held
+
+
+def heel_and_toes(corners: Array) -> Array:
+    """(..., 2, 3) the middles of the heel and of the toes of soles (..., 4, 3)."""
+    return corners.reshape(*corners.shape[:-2], 2, 2, 3).mean(axis=-2)
 
 
 def lowest(places: Array, turns: Array, sole: Array) -> Array:
     """(frames,) metres: the height of the lowest corner of a sole."""
     return (rot.rotate(turns[:, None], sole[None]) + places[:, None])[..., 2].min(axis=1)
-
-
-def _above_ground(places: Array, turns: Array, sole: Array) -> Array:
-    lack = np.maximum(-lowest(places, turns, sole), 0.0)
-    return places + lack[:, None] * np.array([0.0, 0.0, 1.0])
 
 
 def _stances(places: Array, turns: Array, planted: Flags, hole: int) -> Iterator[tuple[int, int]]:

@@ -10,6 +10,7 @@ from motionloom import rotations as rot
 from motionloom.robots.body import Robot, to_motion, to_mujoco, turns_to_mujoco
 from motionloom.robots.clip import Clip
 from motionloom.robots.engine import load_mujoco
+from motionloom.robots.feet import heel_and_toes
 from motionloom.robots.joints import SIDES
 from motionloom.robots.solve import pairs_apart
 
@@ -95,7 +96,7 @@ def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figu
     """The figures of a clip. max_speed: radians per second that no hinge is to exceed, beside what the model states."""
     corners, masses, touching = _followed(clip, robot)
     planted = clip.planted
-    edges = np.stack([corners[:, :, :2].mean(axis=2), corners[:, :, 2:].mean(axis=2)], axis=2)
+    edges = heel_and_toes(corners)
     stays = planted[1:] & planted[:-1]
     moved = np.linalg.norm(np.diff(edges[..., :2], axis=0), axis=-1)[stays]
     stands = planted[..., 0] | planted[..., 1]
@@ -104,9 +105,10 @@ def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figu
     slopes = across[..., 2] / np.linalg.norm(across, axis=-1)
     angles = clip.qpos[:, 7:]
     lower, upper = robot.file.lower, robot.file.upper
-    speeds = np.abs(np.diff(angles, axis=0)) * clip.fps if len(clip) > 1 else np.zeros((1, angles.shape[1]))
+    speeds = np.abs(np.diff(angles, axis=0)) * clip.fps
+    speeds = speeds if len(speeds) else np.zeros((1, angles.shape[1]))
     top = speeds.max(axis=0)
-    most = robot.file.speed if max_speed is None else np.minimum(robot.file.speed, max_speed)
+    most = robot.file.speeds(max_speed)
     share = top / most
     fastest = int((share if np.isfinite(most).any() else top).argmax())
     root_step, root_turn = _root_steps(clip.qpos[:, :7])
@@ -154,7 +156,9 @@ def _followed(clip: Clip, robot: Robot) -> tuple[Array, Array, NDArray[np.bool_]
     itself."""
     mujoco = load_mujoco()
 
-    model, data, pairs = robot.model, mujoco.MjData(robot.model), list(pairs_apart(robot))
+    model = robot.model
+    data = mujoco.MjData(robot.model)
+    pairs = list(pairs_apart(robot))
     sites = [model.site(robot.site(f"{side}_ankle")).id for side in SIDES]
     corners, masses = np.empty((len(clip), 2, 4, 3)), np.empty((len(clip), 3))
     touching, nearest = np.zeros(len(clip), dtype=bool), np.zeros(6)
@@ -183,12 +187,13 @@ def _outside(point: Array, corners: Array) -> bool:
 def planted_soles(robot: Robot, qpos: Array, fps: float) -> NDArray[np.bool_]:
     """(frames, 2, 2) which heels and toes are on the ground, by how low and slow they are: for angles out of a file."""
     motion = to_motion(robot, qpos, fps)
-    places, turns = to_mujoco(motion.positions()), turns_to_mujoco(motion.world_rotations())
+    places = to_mujoco(motion.positions())
+    turns = turns_to_mujoco(motion.world_rotations())
     found = np.zeros((len(qpos), 2, 2), dtype=bool)
     for number, side in enumerate(SIDES):
         j = robot.skeleton.index(f"{side}_ankle")
         corners = places[:, j, None] + rot.rotate(turns[:, j, None], robot.soles[side][None])
-        edges = np.stack([corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)], axis=1)
+        edges = heel_and_toes(corners)
         speed = np.linalg.norm(np.gradient(edges, axis=0), axis=-1) * fps if len(qpos) > 1 else np.zeros((1, 2))
         found[:, number] = (edges[..., 2] < _LOW) & (speed < _SLOW)
     return found

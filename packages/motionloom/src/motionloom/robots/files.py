@@ -112,7 +112,8 @@ def load_clip(path: Path | str, robot: Robot, *, fps: float | None = None) -> Cl
 def _read_csv(path: Path, robot: Robot) -> Array:
     names, columns = robot.file.joint_names(), 7 + len(robot.file.hinges)
     try:
-        lines = list(csv.reader(io.StringIO(read_bytes(path, max_bytes=MAX_BYTES).decode("utf-8-sig"))))
+        text = read_bytes(path, max_bytes=MAX_BYTES).decode("utf-8-sig")
+        lines = list(csv.reader(io.StringIO(text)))
     except (UnicodeDecodeError, csv.Error) as error:
         raise MotionloomError(f"{path} cannot be read as a CSV: {error}") from None
     lines = [line for line in lines if line]
@@ -161,9 +162,7 @@ def _read_npz(path: Path, robot: Robot) -> tuple[Array, float | None, NDArray[np
         raise MotionloomError(f"{path} is of a robot with other joints than {robot.name}; give its own model")
     rate = arrays.get("fps")
     contacts = arrays.get("contacts")
+    stated = rate is not None and rate.shape == () and rate.dtype.kind in "fiu"
     whole = contacts is not None and contacts.shape == (len(poses), 2, 2)
-    return (
-        poses.astype(np.float64),
-        float(rate) if rate is not None and rate.shape == () and rate.dtype.kind in "fiu" else None,
-        contacts.astype(bool) if whole and contacts is not None else None,
-    )
+    planted = contacts.astype(bool) if contacts is not None and whole else None
+    return poses.astype(np.float64), float(rate) if rate is not None and stated else None, planted

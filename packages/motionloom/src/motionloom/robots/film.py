@@ -39,7 +39,8 @@ def draw(robot: Robot, poses: Array, fps: float, path: Path, *, caption: str = "
             return _sheet(renderer, poses, path)
         rate = film_rate(path, fps, None)
         count = max(1, round((len(poses) - 1) / fps * rate) + 1)
-        shown = poses[np.minimum(np.arange(count) * fps / rate, len(poses) - 1).round().astype(int)]
+        places = np.minimum(np.arange(count) * fps / rate, len(poses) - 1)
+        shown = poses[places.round().astype(int)]
 
         def frames(numbers: Sequence[int]) -> Iterator[Image.Image]:
             return renderer.pictures(shown[list(numbers)])
@@ -71,7 +72,9 @@ class _Renderer:
         shown = read_robot(robot.file.path, meshes=True, override=robot.map)
         self.model = _clothed(shown)
         self.data, self.camera = mujoco.MjData(self.model), mujoco.MjvCamera()
-        self.camera.distance, self.camera.azimuth, self.camera.elevation = 2.1 * _tall(robot), 130, -12
+        self.camera.distance = 2.1 * _tall(robot)
+        self.camera.azimuth = 130
+        self.camera.elevation = -12
         try:
             self.renderer = mujoco.Renderer(self.model, size[1], size[0])
         except Exception as error:  # each backend of OpenGL has exceptions of its own
@@ -105,7 +108,8 @@ def _clothed(robot: Robot) -> Any:
     mujoco = load_mujoco()
 
     spec, model, skeleton = robot.file.spec, robot.model, robot.skeleton
-    seen = {int(model.body_weldid[model.geom_bodyid[g]]) for g in range(model.ngeom) if model.geom_rgba[g][3] > 0}
+    visible = [g for g in range(model.ngeom) if model.geom_rgba[g][3] > 0]
+    seen = {int(model.body_weldid[model.geom_bodyid[g]]) for g in visible}
     own = {body.id: body for body in spec.bodies}
     thick = _THICK * float(np.linalg.norm(skeleton.offsets[skeleton.index("left_knee")]))
     few = len(seen - {0}) < 0.6 * len({hinge.body for hinge in robot.file.hinges})
@@ -113,7 +117,9 @@ def _clothed(robot: Robot) -> Any:
         if parent < 0 or not few:
             continue
         site = model.site(robot.site(skeleton.names[parent])).id
-        body, start, turn = int(model.site_bodyid[site]), model.site_pos[site], model.site_quat[site]
+        body = int(model.site_bodyid[site])
+        start = model.site_pos[site]
+        turn = model.site_quat[site]
         end = start + rot.rotate(np.array(turn), to_mujoco(skeleton.offsets[j]))
         own[body].add_geom(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,

@@ -12,7 +12,7 @@ from motionloom.blending import smoothstep
 from motionloom.motion import Motion
 from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
 from motionloom.robots.clip import check_settings
-from motionloom.robots.feet import EASE, ROLLING, angles, lowest, turned_by
+from motionloom.robots.feet import EASE, ROLLING, angles, heel_and_toes, lowest, turned_by
 from motionloom.robots.joints import SIDES
 from motionloom.robots.solve import Solver
 from motionloom.robots.targets import Targets, lack, lowered, rolled
@@ -39,9 +39,8 @@ class Follower:
         Raises `MotionloomError` for a rate or a speed that cannot be.
         """
         check_settings(fps, max_speed)
-        speed = robot.file.speed if max_speed is None else np.minimum(robot.file.speed, max_speed)
         self.robot, self.fps = robot, fps
-        self._solver = Solver(robot, fps, speed=speed, avoid=avoid_collisions)
+        self._solver = Solver(robot, fps, speed=robot.file.speeds(max_speed), avoid=avoid_collisions)
         self._feet = [_Foot(robot.soles[side], fps) for side in SIDES]
         self._down = 0.0
         self.planted = np.zeros((2, 2), dtype=bool)
@@ -66,7 +65,7 @@ class _Foot:
 
     def __init__(self, sole: Array, fps: float) -> None:
         self.sole, self.fps = sole, fps
-        self.edges = np.stack([sole[:2].mean(axis=0), sole[2:].mean(axis=0)])
+        self.edges = heel_and_toes(sole)
         self.before: Array | None = None
         """(2, 3) where heel and toes were asked to be in the frame before."""
         self.stance: tuple[float, Array] | None = None
@@ -120,8 +119,10 @@ class _Foot:
 
     def _stood(self, place: Array, turn: Array) -> tuple[float, Array]:
         """The stance that leaves heel or toes of a foot over the place where they are."""
-        heading, pivot = float(angles(turn[None])[0][0]), self.edges[0 if _rolled(turn) < 0 else 1]
-        stood = place + rot.rotate(turn, pivot) - rot.rotate(turned_by(heading, np.zeros(1))[0], pivot)
+        heading = float(angles(turn[None])[0][0])
+        pivot = self.edges[0 if _rolled(turn) < 0 else 1]
+        flat = turned_by(heading, np.zeros(1))[0]
+        stood = place + rot.rotate(turn, pivot) - rot.rotate(flat, pivot)
         stood[2] = -float(self.sole[:, 2].min())
         return heading, stood
 

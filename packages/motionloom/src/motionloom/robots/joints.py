@@ -4,7 +4,6 @@ A *part* is ``left_hip`` ... ``right_wrist``, ``waist`` or ``neck``, and has the
 Names are those of Unitree (G1, H1), Booster (T1), Fourier (N1), EngineAI (PM01), Atlas and their relatives.
 """
 
-import json
 import re
 from collections import defaultdict
 from dataclasses import dataclass
@@ -15,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.reading import read_bytes
-from motionloom.robots.engine import load_mujoco
+from motionloom.reading import read_json
+from motionloom.robots.engine import posed
 from motionloom.robots.model import Hinge, Model
 
 Array = NDArray[np.float64]
@@ -26,17 +25,17 @@ PARTS = (*(f"{side}_{part}" for side in SIDES for part in (*LEG, *ARM)), "waist"
 _NEEDED = tuple(f"{side}_{part}" for side in SIDES for part in (*LEG, "shoulder", "elbow"))
 
 _TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
-_FINGERS = {"thumb", "index", "middle", "ring", "pinky", "little", "finger", "gripper", "palm", "hand"}
-_WORDS = (
-    ("hip", {"hip", "thigh", "hpz", "hpx", "hpy"}),
-    ("knee", {"knee", "shank", "calf", "shin", "kny"}),
-    ("ankle", {"ankle", "foot", "aky", "akx"}),
-    ("elbow", {"elbow", "forearm", "lowerarm", "ely", "elx"}),
-    ("wrist", {"wrist", "wry", "wrx", "wrz"}),
-    ("shoulder", {"shoulder", "upperarm", "shz", "shx", "shy", "arm"}),
-    ("neck", {"neck", "head", "aahead"}),
-    ("waist", {"waist", "torso", "abdomen", "spine", "trunk", "chest", "back", "lumbar", "bkz", "bky", "bkx"}),
-)
+_FINGERS = "thumb index middle ring pinky little finger gripper palm hand"
+_WORDS = {
+    "hip": "hip thigh hpz hpx hpy",
+    "knee": "knee shank calf shin kny",
+    "ankle": "ankle foot aky akx",
+    "elbow": "elbow forearm lowerarm ely elx",
+    "wrist": "wrist wry wrx wrz",
+    "shoulder": "shoulder upperarm shz shx shy arm",
+    "neck": "neck head aahead",
+    "waist": "waist torso abdomen spine trunk chest back lumbar bkz bky bkx",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,19 +77,12 @@ def find_parts(model: Model, override: Path | None = None) -> Parts:
         for limb in (LEG, ARM):
             line = [found[f"{side}_{part}"] for part in limb if f"{side}_{part}" in found]
             for upper, lower in pairwise(line):
-                if not is_above(model, upper[0].body, lower[-1].body):
+                if upper[0].body not in model.above(lower[-1].body):
                     raise MotionloomError(
                         f"{model.path}: {lower[-1].name} does not hang below {upper[0].name} as a limb's joints do; "
                         "say which joint is which with --robot-map"
                     )
     return Parts(found, "as the map says" if given else how)
-
-
-def is_above(model: Model, upper: int, lower: int) -> bool:
-    """Whether the body ``upper`` is ``lower`` or one of those it hangs on."""
-    while lower not in (0, upper):
-        lower = int(model.model.body_parentid[lower])
-    return lower == upper
 
 
 # By names
@@ -110,11 +102,11 @@ def _read(name: str) -> str | None:
     """The part that a name speaks of: ``J00_HIP_PITCH_L`` -> ``left_hip``."""
     tokens = [token.lower() for token in _TOKEN.findall(name)]
     side = next((s for s in SIDES if s in tokens or s[0] in tokens), None)
-    if any(token in _FINGERS for token in tokens):
+    if not set(tokens).isdisjoint(_FINGERS.split()):
         return None
     joined = {a + b for a, b in pairwise(tokens)}
-    for part, words in _WORDS:
-        if words & {*tokens, *joined}:
+    for part, words in _WORDS.items():
+        if {*tokens, *joined}.intersection(words.split()):
             middle = part in ("waist", "neck")
             return part if middle else (f"{side}_{part}" if side else None)
     return None
@@ -129,7 +121,7 @@ def _by_shape(model: Model) -> dict[str, tuple[Hinge, ...]] | None:
     ends = {key: _tip(model, chain[-1].body) for key, chain in chains.items()}
     legs = sorted((key for key in chains if len(chains[key]) >= 4), key=lambda key: float(ends[key][2]))[:2]
     others = [key for key in chains if key not in legs and len(chains[key]) >= 3]
-    arms = sorted(others, key=lambda key: -_reach(chains[key], ends[key]))[:2]
+    arms = sorted(others, key=lambda key: -_length(chains[key], ends[key]))[:2]
     if len(legs) < 2 or len(arms) < 2:
         return None
     found: dict[str, tuple[Hinge, ...]] = {}
@@ -154,13 +146,7 @@ def _by_shape(model: Model) -> dict[str, tuple[Hinge, ...]] | None:
 def _chains(model: Model) -> dict[int, list[Hinge]]:
     """The hinges from the root down to each last hinge, by that hinge's body."""
     of = {hinge.body: hinge for hinge in model.hinges}
-    chains: dict[int, list[Hinge]] = {}
-    for hinge in model.hinges:
-        line, body = [], hinge.body
-        while body:
-            line += [of[body]] if body in of else []
-            body = int(model.model.body_parentid[body])
-        chains[hinge.body] = line[::-1]
+    chains = {body: [of[other] for other in model.above(body)[::-1] if other in of] for body in of}
     upper = {hinge.body for chain in chains.values() for hinge in chain[:-1]}
     return {body: chain for body, chain in chains.items() if body not in upper}
 
@@ -175,11 +161,7 @@ def _tip(model: Model, body: int) -> Array:
 def limb_points(model: Model, body: int) -> Array:
     """(points, 3) metres in the world of ``qpos0``: origins, centres of mass and geoms of a body and what is fixed to
     it."""
-    mujoco = load_mujoco()
-
-    data = mujoco.MjData(model.model)
-    mujoco.mj_kinematics(model.model, data)
-    points = []
+    data, points = posed(model.model), []
     for other in range(1, model.model.nbody):
         if int(model.model.body_weldid[other]) == int(model.model.body_weldid[body]):
             points += [data.xpos[other], data.xipos[other]]
@@ -188,17 +170,15 @@ def limb_points(model: Model, body: int) -> Array:
     return np.array(points)
 
 
-def _reach(chain: list[Hinge], end: Array) -> float:
+def _length(chain: list[Hinge], end: Array) -> float:
     places = [*(hinge.anchor for hinge in chain), end]
     return float(sum(np.linalg.norm(b - a) for a, b in pairwise(places)))
 
 
 def _middle(chain: list[Hinge], end: Array) -> int:
     """The hinge that parts a limb into two long bones."""
-    apart = [
-        min(float(np.linalg.norm(chain[i].anchor - chain[0].anchor)), float(np.linalg.norm(chain[i].anchor - end)))
-        for i in range(1, len(chain))
-    ]
+    ends = np.stack([chain[0].anchor, end])
+    apart = [np.linalg.norm(ends - hinge.anchor, axis=-1).min() for hinge in chain[1:]]
     return 1 + int(np.argmax(apart))
 
 
@@ -207,7 +187,8 @@ def _middle(chain: list[Hinge], end: Array) -> int:
 
 def _refuse(model: Model, lost: list[str]) -> None:
     name, chains = model.path, _chains(model)
-    low = [chain for chain in chains.values() if len(chain) >= 3 and _on_ground(model, chain)]
+    limbs = [chain for chain in chains.values() if len(chain) >= 3]
+    low = [chain for chain in limbs if _on_ground(model, chain)]
     if len(low) >= 4:
         raise MotionloomError(f"{name} is a robot on {len(low)} legs; a humanoid with two legs and two arms is needed")
     wheels = [h.name for h in model.hinges if not model.model.jnt_limited[h.joint]]
@@ -230,12 +211,7 @@ def _on_ground(model: Model, chain: list[Hinge]) -> bool:
 
 
 def _read_map(model: Model, path: Path) -> dict[str, tuple[Hinge, ...]]:
-    try:
-        data = json.loads(read_bytes(path, max_bytes=1_000_000).decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, MotionloomError):
-            raise
-        raise MotionloomError(f"{path} cannot be read as a map of a robot's joints in JSON: {error}") from None
+    data = read_json(path, "a map of a robot's joints")
     if not isinstance(data, dict):
         raise MotionloomError(f'{path}: a map of a robot\'s joints is an object such as {{"left_knee": "knee_l"}}')
     of, found = {hinge.name: hinge for hinge in model.hinges}, {}

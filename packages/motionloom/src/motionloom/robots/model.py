@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError, one_line
 from motionloom.reading import read_bytes
-from motionloom.robots.engine import load_mujoco
+from motionloom.robots.engine import load_mujoco, posed
 
 Array = NDArray[np.float64]
 MAX_BYTES = 50_000_000
@@ -56,6 +56,17 @@ class Model:
     def name(self) -> str:
         """What the model calls itself; the file's name where it does not."""
         return str(self.spec.modelname) or self.path.stem
+
+    def speeds(self, most: float | None) -> Array:
+        """(hinges,) radians per second that are kept where none is to exceed ``most`` (None: what the file states)."""
+        return self.speed if most is None else np.minimum(self.speed, most)
+
+    def above(self, body: int) -> list[int]:
+        """A body and those that it hangs on, the world (0) last."""
+        line = [body]
+        while line[-1]:
+            line.append(int(self.model.body_parentid[line[-1]]))
+        return line
 
     def joint_names(self) -> tuple[str, ...]:
         """Names of the hinges in order."""
@@ -105,7 +116,8 @@ def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
     folder = path.parent / spec.meshdir
     for mesh in spec.meshes:
         mesh.file = _in_package(mesh.file, path)
-    missing = {mesh.name: mesh.file for mesh in spec.meshes if mesh.file and not (folder / mesh.file).is_file()}
+    named = [(mesh.name, mesh.file) for mesh in spec.meshes if mesh.file]
+    missing = {name: file for name, file in named if not (folder / file).is_file()}
     heavy = all(body.explicitinertial for body in spec.bodies if body.parent is not None)  # without its geoms
     for geom in list(spec.geoms):
         looks = not wanted and heavy and not (geom.contype or geom.conaffinity)
@@ -156,15 +168,13 @@ def _free_root(spec: Any, path: Path) -> list[str]:
         raise MotionloomError(f"{path} has no bodies; give the model of a humanoid robot")
     base = max(bases, key=lambda body: len(body.find_all("joint")))
     base.add_freejoint(name="root")
-    return [] if path.suffix.lower() == ".urdf" else [f"the base of the robot in {path} is fixed; it was set free"]
+    if path.suffix.lower() == ".urdf":
+        return []
+    return [f"the base of the robot in {path} is fixed; it was set free"]
 
 
 def _hinges(model: Any, path: Path) -> tuple[Hinge, ...]:
-    mujoco = load_mujoco()
-
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    found = []
+    mujoco, data, found = load_mujoco(), posed(model), []
     for joint in range(model.njnt):
         kind, name = model.jnt_type[joint], model.joint(joint).name
         if kind == mujoco.mjtJoint.mjJNT_FREE:
@@ -175,10 +185,8 @@ def _hinges(model: Any, path: Path) -> tuple[Hinge, ...]:
             what = "a ball joint" if kind == mujoco.mjtJoint.mjJNT_BALL else "a joint that slides"
             raise MotionloomError(f"{path} has {what}, {name!r}; a robot whose joints are all hinges is needed")
         body = int(model.jnt_bodyid[joint])
-        hinge = Hinge(
-            name or f"joint{joint}", joint, body, int(model.body_parentid[body]), data.xanchor[joint], data.xaxis[joint]
-        )
-        found.append(hinge)
+        parent, axis = int(model.body_parentid[body]), (data.xanchor[joint], data.xaxis[joint])
+        found.append(Hinge(name or f"joint{joint}", joint, body, parent, *axis))
     if not found or len(found) > MAX_HINGES:
         raise MotionloomError(f"{path} has {len(found)} hinges; a humanoid robot has some, and at most {MAX_HINGES}")
     return tuple(found)
@@ -186,7 +194,8 @@ def _hinges(model: Any, path: Path) -> tuple[Hinge, ...]:
 
 def check_limits(model: Model, joints: set[int]) -> None:
     """Refuse a robot that has no limits at these joints (numbers in MuJoCo's model)."""
-    open_ended = [h.name for h in model.hinges if h.joint in joints and not model.model.jnt_limited[h.joint]]
+    own = [hinge for hinge in model.hinges if hinge.joint in joints]
+    open_ended = [hinge.name for hinge in own if not model.model.jnt_limited[hinge.joint]]
     if open_ended:
         more = f" and {len(open_ended) - 3} more" if len(open_ended) > 3 else ""
         raise MotionloomError(

@@ -85,18 +85,14 @@ def _run(clip: Clip, robot: Robot, *, held: bool) -> tuple[float, float, float]:
         if not np.isfinite(data.qpos).all():
             return step * STEP, _rms(errors), saturated / max(step, 1)
         errors.append(float(np.mean((wanted[7:] - data.qpos[7:]) ** 2)))
-        if not held and (data.site_xpos[pelvis][2] < _FALLEN * start or _tilt(model, data, pelvis) > 1.0):
+        tilt = np.arccos(np.clip(data.site_xmat[pelvis][8], -1, 1))  # between the pelvis' up and the world's
+        if not held and (data.site_xpos[pelvis][2] < _FALLEN * start or tilt > 1.0):
             return step * STEP, _rms(errors), saturated / (step + 1)
     return steps * STEP, _rms(errors), saturated / max(steps, 1)
 
 
 def _rms(errors: list[float]) -> float:
     return float(np.sqrt(np.mean(errors))) if errors else 0.0
-
-
-def _tilt(model: Any, data: Any, site: int) -> float:
-    """Radians between the pelvis' up and the world's."""
-    return float(np.arccos(np.clip(data.site_xmat[site].reshape(3, 3)[2, 2], -1, 1)))
 
 
 def _forces(robot: Robot) -> Array:
@@ -132,7 +128,8 @@ def _on_ground(robot: Robot) -> Any:
     spec = robot.file.spec.copy()
     if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05])
-    spec.option.timestep, spec.option.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.timestep = STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = spec.compile()
     model.dof_armature[6:] = np.maximum(model.dof_armature[6:], ARMATURE)
     return model

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.robots.body import Robot
-from motionloom.robots.engine import load_mujoco
+from motionloom.robots.engine import load_mujoco, posed
 from motionloom.robots.joints import SIDES
 from motionloom.robots.targets import Targets
 
@@ -63,7 +63,8 @@ class Solver:
         self.robot, self.fps = robot, fps
         self.configuration = mink.Configuration(robot.model, q=robot.home)
         self.tasks = _tasks(robot)
-        self.posture, self.calm = (mink.PostureTask(robot.model, cost=_posture(robot, c)) for c in (POSTURE, CALM))
+        hinges = np.arange(robot.model.nv) >= 6  # the root is free
+        self.posture, self.calm = (mink.PostureTask(robot.model, cost=c * hinges) for c in (POSTURE, CALM))
         self.posture.set_target(robot.home)
         lower, upper = robot.file.lower + _MARGIN, robot.file.upper - _MARGIN
         step = np.minimum(STEP if speed is None else speed, STEP) / fps
@@ -173,13 +174,6 @@ def _tasks(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _posture(robot: Robot, each: float) -> Array:
-    """(nv,) what a radian of each hinge costs; the root is free."""
-    cost = np.full(robot.model.nv, each)
-    cost[:6] = 0
-    return cost
-
-
 def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, at_once: float) -> Any:
     """mink's limit of the hinges' places and of their and the root's steps since the frame before, in one."""
     import mink
@@ -233,7 +227,9 @@ def _ground(robot: Robot) -> Any:
                     mujoco.mj_jac(robot.model, data, self.jacobian, None, corner, body)
                     rows.append(-self.jacobian[2])
                     room.append(corner[2] + _SINKING)
-            return mink.Constraint(np.array(rows), np.array(room)) if rows else mink.Constraint()
+            if rows:
+                return mink.Constraint(np.array(rows), np.array(room))
+            return mink.Constraint()
 
     return Ground()
 
@@ -242,9 +238,7 @@ def pairs_apart(robot: Robot) -> Iterator[tuple[int, int]]:
     """Pairs of geoms of the robot that may touch and do not where it stands."""
     mujoco = load_mujoco()
 
-    model, data = robot.model, mujoco.MjData(robot.model)
-    data.qpos = robot.home
-    mujoco.mj_kinematics(model, data)
+    model, data = robot.model, posed(robot.model, robot.home)
     own = [
         g for g in range(model.ngeom) if model.geom_bodyid[g] and (model.geom_contype[g] or model.geom_conaffinity[g])
     ]

@@ -65,30 +65,29 @@ def aim(motion: Motion, robot: Robot, *, fps: float, source_map: Override | None
         motion = retarget(motion, robot.skeleton, source_map=source_map)
     motion = motion.resample(fps)
     joints = robot.skeleton.names
-    made = Targets(
+    targets = Targets(
         fps,
         joints,
         to_mujoco(motion.positions()),
         turns_to_mujoco(motion.world_rotations()),
         planted.reshape(len(planted), 2, 2),
     )
-    return rolled(_reaching(_stepping(made, robot), robot), robot)
+    targets = _stepping(targets, robot)
+    down = envelope(lack(targets, robot), round(0.1 * fps))  # so that no leg is stretched out
+    return rolled(lowered(targets, down), robot)
 
 
 def _stepping(targets: Targets, robot: Robot) -> Targets:
     """With feet that stand where they are planted."""
-    places, turns, held = targets.places.copy(), targets.turns.copy(), targets.planted.copy()
+    places = targets.places.copy()
+    turns = targets.turns.copy()
+    held = targets.planted.copy()
     for number, side in enumerate(SIDES):
         ankle = targets.joints.index(f"{side}_ankle")
         places[:, ankle], turns[:, ankle], held[:, number] = plant(
             places[:, ankle], turns[:, ankle], targets.planted[:, number], robot.soles[side], targets.fps
         )
     return replace(targets, places=places, turns=turns, planted=held)
-
-
-def _reaching(targets: Targets, robot: Robot) -> Targets:
-    """With the body lowered so that no leg is stretched out."""
-    return lowered(targets, envelope(lack(targets, robot), round(0.1 * targets.fps)))
 
 
 def lack(targets: Targets, robot: Robot) -> Array:

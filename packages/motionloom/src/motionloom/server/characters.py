@@ -9,8 +9,7 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import characters
 from motionloom.io.bvh import read_bvh
 from motionloom.io.character import Character, load_character
-from motionloom.io.gltf_read import open_glb
-from motionloom.io.gltf_rig import read_rig
+from motionloom.io.gltf_read import read_rigs
 from motionloom.io.text import parse_json
 from motionloom.retarget import joint_map
 from motionloom.retarget.names import parts_by_name
@@ -83,7 +82,7 @@ def question(skeleton: Skeleton) -> dict[str, Any]:
 def _skeleton(path: Path) -> Skeleton:
     if path.suffix == ".bvh":
         return read_bvh(path).motion.skeleton
-    return read_rig(open_glb(path), 0, {}).skeleton
+    return next(read_rigs(path)).skeleton
 
 
 def _knowing(skeleton: Skeleton, named: Named) -> Skeleton:
