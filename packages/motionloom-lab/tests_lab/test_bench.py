@@ -14,7 +14,7 @@ from motionloom.errors import MotionloomError
 from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.weights.prior import Card, Prior
 from motionloom_lab import bench
-from motionloom_lab.bench import long, prediction, speed, start
+from motionloom_lab.bench import long, prediction, speed
 from motionloom_train.modules import prior_session
 from motionloom_train.nets.prior import NetConfig, PriorNet
 from tests.tasks.small_predictor import small_predictor
@@ -69,12 +69,12 @@ def test_starts_are_medians_over_an_import_of_the_libraries_without_the_first_ro
         times = took.get(arguments[0], [9.0, 0.5, 0.5, 1.0])
         return bench.Process(times[asked.count(arguments[0]) - 1], 1.0, 1.0)
 
-    entries = start.starts("default", repeats=3, run=run)
+    entries = speed.starts("default", repeats=3, run=run)
     assert asked == ["-c", "generate", "info", "export", "view"] * 4
     assert [(e.value, e.passes) for e in entries] == [(10.0, True), (0.25, True), (0.25, True), (0.25, True)]
     took["generate"] = took["info"] = took["view"] = [9.0, 40.0, 40.0, 40.0]
     asked.clear()
-    assert [e.passes for e in start.starts("default", repeats=3, run=run)] == [False, False, True, False]
+    assert [e.passes for e in speed.starts("default", repeats=3, run=run)] == [False, False, True, False]
 
 
 def test_python_itself_can_be_timed() -> None:

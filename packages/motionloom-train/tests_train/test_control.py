@@ -14,14 +14,14 @@ from motionloom.features.layout import mask, ric
 from motionloom.skeleton import SMPL22
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior, read_tensors, save_prior
-from motionloom_train.control import ControlledError, train_control
+from motionloom_train.control import CONTROLS, NOTHING, ControlledError, draw_masks, some_frames, train_control
 from motionloom_train.data.batches import Batches
 from motionloom_train.data.sets import load_set
 from motionloom_train.loop import Training
 from motionloom_train.low_rank import adapted, show
-from motionloom_train.masks import CONTROLS, NOTHING, draw_masks, some_frames
 from motionloom_train.modules import prior_module
 from motionloom_train.objectives import WordBank
+from motionloom_train.recipe import Recipe
 from motionloom_train.tensors import conditions, noised, tensor
 from tests.recorded import tiny
 from tests_train import runs
@@ -99,8 +99,7 @@ def test_given_numbers_of_a_training_state_have_no_noise(data):
             seen.append((x, level, given, mask))
             return x
 
-    objective = ControlledError(Spy(), schedule, batches, words)
-    objective.control = "left_wrist"
+    objective = ControlledError(Spy(), schedule, batches, words, Recipe(control="left_wrist"))
     first, again, later = (objective.loss(objective.net, 0, step, 16) for step in (1, 1, 2))
     assert first == again != later
     x, level, clean, flags = seen[0]

@@ -21,17 +21,16 @@ from motionloom_train.low_rank import Controlled
 from motionloom_train.low_rank import adapted as adapted_module
 from motionloom_train.modules import (
     pair_module,
-    pair_session,
     predictor_module,
     predictor_session,
     prior_module,
     prior_session,
     shapes,
-    text_module,
 )
 from motionloom_train.nets.pair import PairConfig, PairNet, Talk
 from motionloom_train.nets.predictor import TransLinear
 from motionloom_train.nets.prior import Bound, Condition, NetConfig, PriorNet
+from tests_train.nets.modules import pair_session, text_module
 
 NEAR = 1e-4
 FRAMES = 45

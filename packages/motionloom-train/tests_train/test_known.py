@@ -3,7 +3,7 @@
 import torch
 
 from motionloom_train.data.sets import Item, MotionSet
-from motionloom_train.known import known_table
+from motionloom_train.prior import known_table
 from tests.recorded import tiny
 
 

@@ -5,7 +5,7 @@ import torch
 
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FEET, LAYOUT, ric
-from motionloom_train.objectives import PLANTED, WEIGHTS, displacement_error, feature_scale
+from motionloom_train.objectives import PLANTED, displacement_error, feature_scale
 from tests.kinematics.people import walking
 
 MEAN, STD = torch.full((263,), 0.1), torch.full((263,), 0.5)
@@ -61,7 +61,7 @@ def test_padding_is_not_looked_at() -> None:
 
 def test_heights_count_more_and_nothing_else_does() -> None:
     """The root's height and every joint's second number, relative to the rest; the mean stays 1."""
-    plain, raised = feature_scale(), feature_scale(WEIGHTS, 3.0)
+    plain, raised = feature_scale(), feature_scale(3.0)
     ratio = (raised / plain) / (raised / plain)[LAYOUT["rot6d"]][0]
     wanted = torch.ones(263)
     wanted[LAYOUT["root_height"]] = 3.0

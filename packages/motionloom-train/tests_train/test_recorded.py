@@ -7,13 +7,14 @@ import pytest
 import torch
 
 from motionloom.runtime import prior_condition
-from motionloom_train.modules import arrays, pair_module, predictor_module, prior_module, text_module
+from motionloom_train.modules import arrays, pair_module, predictor_module, prior_module
 from motionloom_train.nets.pair import Talk
 from motionloom_train.nets.prior import Condition
 from tests.recorded import tiny
 from tests.recorded.graphs import BLOCKS, FILE, PREDICTORS, PRIORS, load_graphs
 from tests.recorded.tiny_predictor import network
 from tests.tasks.two_people import block
+from tests_train.nets.modules import text_module
 from tests_train.record_graphs import record
 
 NEAR = 1e-4

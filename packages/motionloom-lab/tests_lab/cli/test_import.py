@@ -94,7 +94,7 @@ def test_missing_options_are_warned_of_and_babel_makes_motions(
         opened.append(length)
         return Words()
 
-    monkeypatch.setattr("motionloom_train.nets.text.clip.ClipText.open", clip)
+    monkeypatch.setattr("motionloom_train.nets.text.hub.ClipText.open", clip)
     asked = ["--weights", "b.safetensors", "--seconds", "0.5", "--steps", "2", "--out", "a.bvh"]
     assert main(["generate", "walk", *asked]) == 0
     motion = load("a.bvh")

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from motionloom.diffusion import DDPM, Denoiser, chain, cosine, inpaint, observe, restart, run
-from motionloom_lab.papers.commdm import from_published_pair
+from motionloom_lab.papers.mdm import from_published_pair
 from motionloom_train.nets.pair import PairNet
 from motionloom_train.nets.prior import condition
 from tests.conformance.runner import (

@@ -80,7 +80,8 @@ def test_both_layouts_of_names_are_read_and_ten_pairs_are_split(recorded, tmp_pa
     found = dp._pair_files(tmp_path)
     assert sorted(found) == [f"p{n}" for n in range(10)]
     assert found["p1"] == (tmp_path / "p1/a.bvh", tmp_path / "p1/b.bvh")
-    assert [dp._split(n) for n in range(10)] == ["train"] * 4 + ["val"] + ["train"] * 4 + ["test"]
+    pairs = dp.read_pair_folder(tmp_path, captions=False)
+    assert [pair.split for pair in pairs] == ["train"] * 4 + ["val"] + ["train"] * 4 + ["test"]
 
 
 def test_completion_needs_no_captions_and_text_does(one):

@@ -8,7 +8,7 @@ from motionloom_lab.metrics.obedience import SETS
 from motionloom_train.data.actions import ACTIONS
 from motionloom_train.data.clips import Note
 from motionloom_train.data.made import GESTURES
-from motionloom_train.data.sayings import sayings, table
+from motionloom_train.data.sets import sayings, table
 from motionloom_train.data.words import LABELS
 
 

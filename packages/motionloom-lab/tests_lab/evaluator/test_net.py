@@ -13,6 +13,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import LAYOUT
 from motionloom.runtime.text.minilm import pack
+from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.evaluator.net import (
     INPUTS,
     KEY,
@@ -53,7 +54,7 @@ def motions() -> list[np.ndarray]:
 def test_points_are_unit_vectors(motions: list[np.ndarray]) -> None:
     """Of motions and of sentences."""
     made = embedder()
-    for points in (made.motions(motions), made.texts(["a person walks", "turn left"])):
+    for points in (made.motions(motions), made.texts([Caption("a person walks"), Caption("turn left")])):
         assert points.dtype == np.float64
         assert np.linalg.norm(points, axis=1) == pytest.approx(1.0, abs=1e-6)
 
@@ -71,8 +72,8 @@ def test_a_motion_stands_alone(motions: list[np.ndarray]) -> None:
 def test_a_sentence_stands_alone() -> None:
     """A longer sentence in the same call changes nothing."""
     made = embedder()
-    assert made.texts(["walk", "a person turns left . a person walks"])[:1] == pytest.approx(
-        made.texts(["walk"]), abs=1e-5
+    assert made.texts([Caption("walk"), Caption("a person turns left . a person walks")])[:1] == pytest.approx(
+        made.texts([Caption("walk")]), abs=1e-5
     )
 
 
@@ -124,7 +125,7 @@ def test_a_file_gives_the_evaluator_back(tmp_path: Path, motions: list[np.ndarra
     assert back.card == made.card
     assert torch.equal(back.mean, made.mean)
     assert back.motions(motions) == pytest.approx(made.motions(motions), abs=5e-3)
-    assert back.texts(["a person walks"]) == pytest.approx(made.texts(["a person walks"]), abs=5e-3)
+    assert back.texts([Caption("a person walks")]) == pytest.approx(made.texts([Caption("a person walks")]), abs=5e-3)
 
 
 def test_another_text_encoder_is_refused(tmp_path: Path) -> None:

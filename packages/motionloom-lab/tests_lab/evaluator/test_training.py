@@ -12,6 +12,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import WIDTH
 from motionloom.weights.prior import save_prior
+from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.evaluator.net import load_embedder
 from motionloom_lab.evaluator.pairs import PairBatch, Pairs, backwards, contrary, negatives, opposed, senses
 from motionloom_lab.evaluator.training import config_of, contrast, train_evaluator
@@ -140,7 +141,7 @@ def test_a_stopped_run_goes_on_with_the_same_losses(data: Path, tmp_path: Path) 
     assert whole.read_bytes() == parts.read_bytes()
     made = load_embedder(whole, tiny.text())
     assert made.card["licence"] == "free"
-    assert made.texts(["a person walks"]).shape == (1, 128)
+    assert made.texts([Caption("a person walks")]).shape == (1, 128)
 
 
 @pytest.mark.parametrize("net", [{"patch": 4, "text": TEXT}, {"text": 384}, {"width": 30, "text": TEXT}])

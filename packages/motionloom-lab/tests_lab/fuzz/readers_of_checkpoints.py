@@ -71,7 +71,7 @@ def humanmac(folder: Path) -> None:
 
 
 def read_humanmac(folder: Path) -> object:
-    from motionloom_lab.papers.humanmac_checkpoint import import_humanmac
+    from motionloom_lab.papers.published_priors import import_humanmac
 
     return import_humanmac(folder / "a.pt")
 

@@ -29,14 +29,14 @@ def read_reports(folder: Path) -> object:
 
 
 def part(folder: Path) -> None:
-    from motionloom_lab.suites.parts import Parts
+    from motionloom_lab.suites.harness import Parts
 
     (folder / "parts").mkdir()
     Parts(folder, "settings").keep("one", {"a": 1.5, "b": 0.0})
 
 
 def read_part(folder: Path) -> object:
-    from motionloom_lab.suites.parts import Parts
+    from motionloom_lab.suites.harness import Parts
 
     return Parts(folder, "settings").find("one")
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
-from motionloom_lab.metrics.frechet import fid, fid_bias
+from motionloom_lab.metrics.retrieval import fid, fid_bias
 
 
 def with_moments(mean: np.ndarray, root: np.ndarray, n: int, seed: int = 0) -> np.ndarray:

@@ -20,16 +20,16 @@ from motionloom.weights import pair as pair_block
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.container import PAIRS, graph_tensors
 from motionloom.weights.pair import PairBlock, blocks
-from motionloom_lab.papers.commdm import adds_of, from_published_pair, is_pair
+from motionloom_lab.papers.mdm import adds_of, from_published_pair, is_pair
 from motionloom_lab.papers.published_priors import import_block
 from motionloom_train.export import pair_graph
-from motionloom_train.modules import arrays, pair_session, prior_session
+from motionloom_train.modules import arrays, prior_session
 from motionloom_train.nets.pair import PairConfig, PairNet, Talk, fitting, join, other, part
 from motionloom_train.nets.prior import Bound, NetConfig, condition
 from tests.recorded import tiny
 from tests.recorded.tiny import WIDTH as TEXT
 from tests_lab.papers.test_mdm import table
-from tests_train.nets.modules import tiny_net
+from tests_train.nets.modules import pair_session, tiny_net
 
 VARIANTS = {"modulated": tiny.MODULATED, "published": tiny.PUBLISHED}
 variants = pytest.mark.parametrize("variant", sorted(VARIANTS))

@@ -11,7 +11,7 @@ from motionloom.errors import MotionloomError
 from motionloom.runtime.predictor import PredictorConfig
 from motionloom.weights.predictor import Predictor, save_predictor
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
-from motionloom_lab.papers.humanmac_checkpoint import import_humanmac, is_humanmac
+from motionloom_lab.papers.published_priors import import_humanmac, is_humanmac
 from motionloom_train.nets.predictor import TransLinear
 from tests_lab.papers.test_mdm import Bomb
 

@@ -10,8 +10,7 @@ from scipy.fft import idct
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom_lab.papers.mrt import Mrt, MrtConfig, MrtFile, _nearness, completed
-from motionloom_lab.papers.mrt_training import RECIPE, Seconds, train_mrt
+from motionloom_lab.papers.mrt import RECIPE, Mrt, MrtConfig, MrtFile, Seconds, _nearness, completed, train_mrt
 from motionloom_train.data.pairs import Pair
 from motionloom_train.loop import Training
 

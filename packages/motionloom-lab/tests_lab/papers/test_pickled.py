@@ -15,7 +15,7 @@ from motionloom.errors import MotionloomError
 from motionloom_lab.papers.benchmarks import (
     read_h36m,
 )
-from motionloom_lab.papers.pickled import read_tables
+from motionloom_lab.papers.plain_pickle import read_tables
 
 
 @pytest.mark.parametrize("protocol", [2, 3, 4])

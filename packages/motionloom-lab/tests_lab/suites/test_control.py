@@ -18,9 +18,8 @@ from motionloom_lab.report import report
 from motionloom_lab.suites import control, control_kinds
 from motionloom_lab.suites.control_kinds import Kind, Target, kind
 from motionloom_lab.suites.control_methods import BASE, EXPORTED, METHODS, OURS, UNCONTROLLED, Made, groups, of_motion
-from motionloom_lab.suites.harness import Run, physical_mean
+from motionloom_lab.suites.harness import Parts, Run, physical_mean
 from motionloom_lab.suites.items import Item
-from motionloom_lab.suites.parts import Parts
 from motionloom_lab.suites.protocol import Selection
 from tests.kinematics.people import FPS, standing, walking
 

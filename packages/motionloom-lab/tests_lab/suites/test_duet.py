@@ -18,13 +18,12 @@ from motionloom.weights.pair import PairBlock
 from motionloom_lab.papers.mrt import Mrt, MrtConfig, MrtFile
 from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import REAL
-from motionloom_lab.suites import duet, duet_answers, duet_blocks, duet_text
+from motionloom_lab.suites import duet, duet_answers, duet_text
 from motionloom_lab.suites import duet_ways as ways
-from motionloom_lab.suites.duet import COLUMNS, ERRORS, LOOKS, CompletionSettings
-from motionloom_lab.suites.duet_blocks import Beside
+from motionloom_lab.suites.duet import COLUMNS, ERRORS, LOOKS, Beside, CompletionSettings
 from motionloom_lab.suites.duet_ways import FRAMES, Crops
 from motionloom_lab.suites.harness import Run
-from motionloom_lab.suites.needs import NoData, pairs_of
+from motionloom_lab.suites.items import NoData, pairs_of
 from motionloom_train.export import pair_graph
 from motionloom_train.modules import arrays
 from motionloom_train.nets.pair import Talk, fitting
@@ -128,7 +127,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
     positions = couple(6.0) + np.array([0.0, 0.3, 0.0])  # features call their lowest point 0, the world does not
     crops, prior = crops_of(positions), tiny.prior()
     oracle, net = Oracle(crops), ways.no_communication_net(tiny.prior())
-    way = ways.sampled(prior, net, given=given, steps=4, make=oracle)
+    way = ways.sampled(prior, net, ways.CompletionSettings(given=given, steps=4), oracle)
     found = duet.score(crops, way, 1)
     assert max(float(np.abs(found[name]).max()) for name in ERRORS) < 1e-4
     asked = oracle.asked[0]
@@ -146,7 +145,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
 def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
     crops, prior = crops_of(couple(6.0), 4), tiny.prior()
     oracle = Oracle(crops)
-    way = ways.sampled(prior, ways.no_communication_net(prior), steps=4, make=oracle)
+    way = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=4), oracle)
     way(crops, 0), way(crops.part(slice(2, 4)), 0), way(crops, 1)
     whole, part, again = (asked["seeds"] for asked in oracle.asked)
     assert whole[4:] == part
@@ -155,7 +154,7 @@ def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
 
 def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
     crops, prior = crops_of(couple(6.0), 2), tiny.prior()
-    made = ways.sampled(prior, ways.no_communication_net(prior), steps=2)(crops, 0)
+    made = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=2))(crops, 0)
     assert made.shape == (2, 2, FRAMES, 22, 3)
     np.testing.assert_allclose(made[:, :, :20], crops.positions[:, :, :20], atol=2e-3)
     assert np.isfinite(made).all()
@@ -298,13 +297,13 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
         saved(prior, tmp_path / "x.safetensors", "layers2", layers=2, split=1),
         saved(prior, tmp_path / "y.safetensors", "known", aware=True),
     ]
-    found = duet_blocks.beside(prior, files, {"steps": 2})
+    found = duet.beside_rows(prior, files, ways.CompletionSettings(steps=2))
     assert [one.row for one in found] == [
         "layers2: 2 layers after layer 1, not aware",
         f"known: 1 layer after layer {last}",
     ]
     assert found[0].digest == weights_digest(files[0])[:12]  # graphs do not count
-    silent = ways.sampled(prior, ways.no_communication_net(prior), steps=2)
+    silent = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=2))
     made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))
     np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
 
@@ -314,11 +313,11 @@ def test_two_blocks_of_one_name_and_blocks_of_another_prior_are_reported(tmp_pat
     one = saved(prior, tmp_path / "one.safetensors", "same")
     two_of = saved(prior, tmp_path / "two.safetensors", "same", layers=2)
     with pytest.raises(MotionloomError, match="are called 'same'"):
-        duet_blocks.beside(prior, [one, two_of], {"steps": 2})
+        duet.beside_rows(prior, [one, two_of], ways.CompletionSettings(steps=2))
     with pytest.raises(MotionloomError, match=r"one\.safetensors belongs to the weights"):
-        duet_blocks.beside(ways.bare(prior), [one], {"steps": 2})
+        duet.beside_rows(ways.bare(prior), [one], ways.CompletionSettings(steps=2))
     with pytest.raises(MotionloomError, match="there is no such file"):
-        duet_blocks.beside(prior, [tmp_path / "none.safetensors"], {"steps": 2})
+        duet.beside_rows(prior, [tmp_path / "none.safetensors"], ways.CompletionSettings(steps=2))
 
 
 def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_path: Path) -> None:

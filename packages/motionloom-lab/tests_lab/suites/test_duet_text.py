@@ -14,7 +14,7 @@ from motionloom_lab.metrics import pair as mp
 from motionloom_lab.report import report as reports
 from motionloom_lab.suites import duet_answers, duet_long, duet_text
 from motionloom_lab.suites.harness import Run
-from motionloom_lab.suites.needs import NoData
+from motionloom_lab.suites.items import NoData
 from tests.kinematics.people import FPS, standing
 from tests.recorded import tiny
 from tests_lab.suites.duets import RECORDED, Person, block_over, couple, pair_of, partners
@@ -300,13 +300,13 @@ def test_every_part_is_made_by_its_own_module_and_told_with_its_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: dict[str, Any] = {}
-    for module in (duet_text, duet_answers, duet_long):
+    modules = {duet_text.parts: "text", duet_answers.parts: "answers", duet_long.parts: "long"}
 
-        def run(run: Run, module: Any = module, **how: Any) -> reports.Report:
-            asked[module.__name__.rsplit("_")[-1]] = {**how, "command": run.command}
-            return reports.Report("duet-x", module.__name__, run.command, {}, duet_text.COLUMNS, ())
+    def run(run: Run, parts_of: Any, **how: Any) -> reports.Report:
+        asked[modules[parts_of]] = {**how, "command": run.command}
+        return reports.Report("duet-x", modules[parts_of], run.command, {}, duet_text.COLUMNS, ())
 
-        monkeypatch.setattr(module, "run", run)
+    monkeypatch.setattr(duet_text, "run", run)
     words = ["evaluate", "duet", "--data", str(tmp_path), "--quick", "--duets", "3", "--out", str(tmp_path / "out")]
     for part in ("text", "answers", "long"):
         assert main([*words, "--only", part]) == 0

@@ -14,7 +14,7 @@ from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.tasks.long import compose
 from motionloom.tasks.splice import concatenate
 from motionloom.weights.prior import Card, Prior
-from motionloom_lab.suites.generator import generator
+from motionloom_lab.suites.harness import generator
 from motionloom_train.modules import prior_session
 from motionloom_train.nets.prior import NetConfig, PriorNet
 from tests.kinematics.people import walking

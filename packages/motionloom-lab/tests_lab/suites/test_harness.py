@@ -10,8 +10,6 @@ from motionloom_lab.metrics.obedience import check
 from motionloom_lab.suites import (
     control,
     duet,
-    duet_answers,
-    duet_long,
     duet_text,
     obey,
     prediction,
@@ -44,8 +42,6 @@ def test_obedience_and_realism_take_a_function_that_makes_motions(tmp_path: Path
     [
         control,
         duet,
-        duet_answers,
-        duet_long,
         duet_text,
         obey,
         prediction,

@@ -2,12 +2,14 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
+from motionloom.tasks.completion import futures
 from motionloom.weights.predictor import save_predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.papers.benchmark_layouts import HUMANEVA_LAYOUT
@@ -80,7 +82,7 @@ def test_futures_of_similar_pasts_are_counted_among_all_windows_whichever_are_me
 def test_how_many_windows_go_at_a_time_changes_nothing(trial: trials.PredictionTrial) -> None:
     tiny = predictor()
     for way in (
-        prediction.sampled(tiny, 0, samples=3, steps=2),
+        partial(futures, tiny, count=3, seed=0, steps=2),
         prediction.as_published(tiny, 0, samples=3, steps=3),
     ):
         one, all_ = (trials.score(trial, way, samples=3, chunk=chunk) for chunk in (1, 100))

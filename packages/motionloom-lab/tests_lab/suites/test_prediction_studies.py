@@ -18,11 +18,11 @@ from motionloom_lab.suites import prediction_trial as trials
 from tests_lab.suites.predicted import AHEAD, SEEN, predictor, protocol
 from tests_lab.suites.test_prediction import humaneva
 
-SMALL = studies.Budget(2, 2, 4, seconds=1.0, walks=(2, 4))
+SMALL = behaviour.Budget(2, 2, 4, seconds=1.0, walks=(2, 4))
 
 
-def lab(keep: Path, say=lambda line: None) -> studies.Lab:
-    return studies.Lab(protocol(), SMALL, predictor, keep, progress=say)
+def lab(keep: Path, say=lambda line: None) -> behaviour.Lab:
+    return behaviour.Lab(protocol(), SMALL, keep, say=say)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_a_stopped_network_goes_on(small: None, tmp_path: Path) -> None:
 
 
 def test_steps_are_compared_with_the_most_steps_of_their_kind(keep: Path, tmp_path: Path) -> None:
-    found = studies.study("steps", lab(keep))
+    found = studies.study("steps", lab(keep), predictor())
     assert len(found.rows) == 1 + 2 * 3 * len(SMALL.walks)
     by_name = {row.name: row.values for row in found.rows}
     few, many = (by_name[f"dpm2m, index, {n} steps"] for n in (2, 4))
@@ -112,8 +112,8 @@ def test_steps_are_compared_with_the_most_steps_of_their_kind(keep: Path, tmp_pa
 def test_a_long_future_begins_as_a_short_one_and_goes_on_from_its_end() -> None:
     trial = trials.prepare(protocol(), count=2)
     tiny = predictor()
-    short = behaviour.long_futures(tiny, trial, samples=2, seed=0, seconds=AHEAD / 30)
-    long = behaviour.long_futures(tiny, trial, samples=2, seed=0, seconds=3 * AHEAD / 30)
+    short = behaviour.long_futures(tiny, trial, behaviour.Budget(2, 2, seconds=AHEAD / 30))
+    long = behaviour.long_futures(tiny, trial, behaviour.Budget(2, 2, seconds=3 * AHEAD / 30))
     assert long.shape == (2, 2, 3 * AHEAD, 22, 3)
     assert np.allclose(long[:, :, :AHEAD], short)
     steps = np.linalg.norm(np.diff(long[:, :, :, 0], axis=2), axis=-1)
@@ -121,7 +121,7 @@ def test_a_long_future_begins_as_a_short_one_and_goes_on_from_its_end() -> None:
 
 
 def test_a_horizon_is_measured_second_by_second_beside_real_motion(keep: Path) -> None:
-    found = studies.study("horizon", replace(lab(keep), budget=replace(SMALL, seconds=2.0)))
+    found = studies.study("horizon", replace(lab(keep), budget=replace(SMALL, seconds=2.0)), predictor())
     assert [row.name for row in found.rows] == [REAL, "second 1", "second 2"]
     real = found.rows[0].values
     trial = trials.prepare(protocol(), count=2)
@@ -175,12 +175,12 @@ def test_poses_are_compared_with_those_that_were_trained_on() -> None:
         assert bool(away.max() < 1e-5) == near
 
 
-def test_every_second_of_a_long_future_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_second_of_a_long_future_is_measured_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first second stands, the second goes 1 m/s; the two real windows are of different people."""
     walks = np.stack([gliding(60), gliding(60)])
     walks[:, :, :, 0] = walks[:, :1, :, 0] + np.maximum(np.arange(60) - 30, 0)[:, None] / 30
     monkeypatch.setattr(behaviour, "long_futures", lambda *args, **given: np.stack([walks, walks]))
-    _, rows, about = behaviour.horizon(behaviour.Study(predictor(), protocol(), windows=2, samples=2, seconds=2))
+    _, rows, about = behaviour.horizon(replace(lab(tmp_path), budget=behaviour.Budget(2, 2, seconds=2)), predictor())
     assert [row.values["root_speed"].mean for row in rows[1:]] == pytest.approx([0, 1])
     assert [row.values["spread"].mean for row in rows[1:]] == pytest.approx([0, 0], abs=1e-6)
     assert rows[0].values["spread"].mean > 0.01
@@ -245,18 +245,18 @@ def test_what_is_held_comes_out_as_given(group: str) -> None:
     assert found["free"] > 0 < found["given"]
 
 
-def test_a_switch_arrives_at_the_target_itself() -> None:
-    columns, rows, about = behaviour.arrive(behaviour.Study(predictor(), protocol(), windows=2, samples=1))
+def test_a_switch_arrives_at_the_target_itself(tmp_path: Path) -> None:
+    columns, rows, about = behaviour.arrive(replace(lab(tmp_path), budget=behaviour.Budget(2, 1)), predictor())
     assert [row.name for row in rows] == [REAL, "cut", "0.5 s", "1 s", "2 s"]
     assert all(row.values["target"].mean < 1e-6 for row in rows[2:])
     assert {c.name for c in columns} >= set(rows[2].values)
     assert about["pairs"] == 2
 
 
-def test_weights_of_another_skeleton_have_no_parts_to_hold() -> None:
+def test_weights_of_another_skeleton_have_no_parts_to_hold(tmp_path: Path) -> None:
     blind = predictor(layout=replace(protocol().layout, root=False))
     with pytest.raises(MotionloomError, match="22 joints"):
-        behaviour.hold(behaviour.Study(blind, protocol(), windows=1, samples=1))
+        behaviour.hold(lab(tmp_path), blind)
 
 
 def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:

@@ -8,8 +8,8 @@ import pytest
 from motionloom_lab.metrics.obedience import CHECKS
 from motionloom_lab.metrics.realism import NUMBERS
 from motionloom_lab.suites import realism
-from motionloom_lab.suites.clips import RealClip
 from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.items import RealClip
 from motionloom_lab.suites.reference import confusion_table, known, rates, reference
 from tests.kinematics.people import FPS, moved, standing, walking
 

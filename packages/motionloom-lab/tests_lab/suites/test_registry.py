@@ -16,10 +16,10 @@ from motionloom_lab.metrics.obedience import check
 from motionloom_lab.metrics.realism import NUMBERS, average
 from motionloom_lab.report import results
 from motionloom_lab.report.report import Column, Report, Row, Value, encode, markdown, read
-from motionloom_lab.suites import bodies, needs, obey, physical
-from motionloom_lab.suites.clips import RealClip
+from motionloom_lab.suites import bodies, items, obey, physical
 from motionloom_lab.suites.everything import QUICK, Outcome, run_all
 from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.items import RealClip
 from motionloom_lab.suites.registry import SUITES, Job, Suite, Tools, chosen, command
 from tests.kinematics.people import FPS, moved, standing, walking
 
@@ -152,10 +152,10 @@ def test_a_suite_whose_kind_of_data_is_not_there_is_skipped_and_asked_again(job:
     """Before it runs, or in it; once the data are there it is measured, and what is finished is not asked."""
     (tmp_path / "set").mkdir()
     job, out = replace(job, data=tmp_path / "set"), tmp_path / "out"
-    pairs = replace(Counted("pairs").suite("needed"), needs=needs.need_pairs)
+    pairs = replace(Counted("pairs").suite("needed"), needs=items.need_pairs)
 
     def none(job: Job, settings: Mapping[str, Any]) -> Report:
-        raise needs.NoData("there is no held-out pair")
+        raise items.NoData("there is no held-out pair")
 
     outcomes = run_all(job, out, [pairs, replace(Counted("later").suite("used"), run=none)])
     assert [(one.state, one.failed, one.report) for one in outcomes] == [("skipped", False, None)] * 2
@@ -180,21 +180,21 @@ def test_what_says_that_a_folder_has_pairs(tmp_path: Path) -> None:
         for place, text in lines.items():
             (tmp_path / name / place).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name / place).write_text(text)
-        assert needs.has_pairs(tmp_path / name) == has, name
+        assert items.has_pairs(tmp_path / name) == has, name
 
 
 def test_a_set_without_test_subjects_or_captions_lacks_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "clips").mkdir()
-    with pytest.raises(needs.NoData, match="futures"):
-        needs.need_recordings(tmp_path)
+    with pytest.raises(items.NoData, match="futures"):
+        items.need_recordings(tmp_path)
     (tmp_path / "clips" / "13_11.safetensors").write_text("")
-    needs.need_recordings(tmp_path)
+    items.need_recordings(tmp_path)
     clips = [RealClip("a", "own", "train", ("walks",), STILL), RealClip("b", "own", "val", (), STILL)]
-    monkeypatch.setattr("motionloom_lab.suites.clips.real_clips", lambda folder: iter(clips))
-    with pytest.raises(needs.NoData, match="no held-out clip"):
-        needs.need_captions(tmp_path)
+    monkeypatch.setattr("motionloom_lab.suites.items.real_clips", lambda folder: iter(clips))
+    with pytest.raises(items.NoData, match="no held-out clip"):
+        items.need_captions(tmp_path)
     clips.append(RealClip("c", "own", "test", ("walks",), STILL))
-    needs.need_captions(tmp_path)
+    items.need_captions(tmp_path)
 
 
 def test_every_suite_that_reads_data_asks_what_it_needs(tmp_path: Path) -> None:
@@ -322,7 +322,7 @@ def test_obedience_as_shares_of_seeds() -> None:
 
     checks = [check("walk forward"), check("stand still")]
     found = obey.run(Run(), checks, generate=half, seeds=4, paraphrases=True)
-    made = physical.obedience_report(found, checks, command="c", settings={"seeds": 4})
+    made = physical.obedience_report(found, checks, run=Run(command="c"), settings={"seeds": 4})
     rows = {row.name: row.values for row in made.rows}
     assert rows["a person walks forward"]["obeyed"] == Value(0.5, count=4)
     assert rows["a person walks forward"]["real"] == Value(111 / 113, count=113)
@@ -360,19 +360,19 @@ def test_clips_of_other_lengths_that_move_alike_have_no_spread() -> None:
 
 def test_realism_beside_real_clips_and_beside_shipped_numbers() -> None:
     clips = [walking(1.2, 3.0), walking(1.0, 3.0)]
-    beside = physical.realism_report({"generated": clips}, FPS, clips, command="", protocol={})
+    beside = physical.realism_report({"generated": clips}, FPS, clips, run=Run(), protocol={})
     assert [row.name for row in beside.rows] == ["real", "generated"]
     assert beside.rows[1].values["speed_distance"].mean == pytest.approx(0.0)
     wanted, real, about = physical.realism_orders(None, 20)
     assert sum(len(order.prompts) for order in wanted) == 20
-    alone = physical.realism_report({"generated": clips}, FPS, real, command="", protocol=about)
+    alone = physical.realism_report({"generated": clips}, FPS, real, run=Run(), protocol=about)
     assert [c.name for c in alone.columns][: len(NUMBERS)] == [n.name for n in NUMBERS]
 
 
 def test_the_realism_report_holds_bodies_against_recorded_people() -> None:
     """Eight numbers of the body, the same as of `motionloom evaluate realism`."""
     clips, numbers = [walking(1.2, 3.0), standing(3.0)], dict.fromkeys((n.name for n in NUMBERS), 1.0)
-    real, ours = physical.realism_report({"ours": clips}, FPS, numbers, command="", protocol={}).rows
+    real, ours = physical.realism_report({"ours": clips}, FPS, numbers, run=Run(), protocol={}).rows
     held, reach = bodies.judge(clips, bodies.known()), bodies.known()
     assert ours.values["body_knees"].mean == held["numbers"]["knees"]["median"]
     assert ours.values["body_bones"].mean == held["numbers"]["bones"]["stretched"]
@@ -383,7 +383,7 @@ def test_the_realism_report_holds_bodies_against_recorded_people() -> None:
 def test_speed_has_its_targets_and_the_machine_in_the_protocol() -> None:
     entry = {"name": "generate, start to BVH", "value": 3.2, "unit": "s", "target": "< 8", "passes": True, "note": "n"}
     found = {"machine": {"device": "x86", "load": 2.0}, "quick": False, "entries": [entry]}
-    made = physical.speed_report(found, command="c")
+    made = physical.speed_report(found, run=Run(command="c"))
     assert made.protocol["machine"] == {"device": "x86"}  # load is no setting
     assert made.columns[0].better == "down"
     assert made.rows[0].values[made.columns[0].name].mean == 3.2

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom_lab.report import published_rows, report
+from motionloom_lab.report import report, tables
 from motionloom_lab.report.report import Report
 from motionloom_lab.suites import text, text_reference
-from motionloom_lab.suites.harness import Run
-from motionloom_lab.suites.parts import Parts, fingerprint
+from motionloom_lab.suites.harness import Parts, Run, fingerprint
 from motionloom_lab.suites.protocol import Protocol, Selection
 from tests_lab.suites.judged import WIDTH, Judge, Painter, item, place
 
@@ -222,7 +221,7 @@ def test_the_report_can_be_read_again_and_its_published_rows_stand_apart() -> No
 
 def test_published_rows_are_marked_and_possible() -> None:
     """Shares lie in 0..1 and grow with k; none claims to be measured here."""
-    rows = published_rows.published("text", [column.name for column in text.COLUMNS])
+    rows = tables.published("text", [column.name for column in text.COLUMNS])
     assert len(rows) == 33
     for row in rows:
         shares = [row.values[k].mean for k in ("r1", "r2", "r3") if k in row.values]

@@ -15,9 +15,8 @@ from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.transitions import JERK_HUMANML3D
 from motionloom_lab.report import report
 from motionloom_lab.suites import long_baselines, real_seams, text_reference, transitions
-from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.harness import Parts, Run
 from motionloom_lab.suites.long_baselines import DEFAULT, Long, methods, rows_of, titled
-from motionloom_lab.suites.parts import Parts
 from motionloom_lab.suites.protocol import Selection, Transitions, quick_transitions
 from motionloom_lab.suites.registry import chosen
 from tests.recorded import tiny

@@ -9,9 +9,8 @@ from motionloom.features import humanml
 from motionloom.kinematics import physics as ph
 from motionloom_lab.metrics.obedience import EVERYDAY
 from motionloom_lab.suites import trial
-from motionloom_lab.suites.clips import RealClip
-from motionloom_lab.suites.trial import Examples
-from motionloom_lab.suites.trial_clips import trials
+from motionloom_lab.suites.items import RealClip
+from motionloom_lab.suites.trial import Examples, trials
 from motionloom_train.data.build import clips_of
 from motionloom_train.data.sources import find_takes
 from tests.kinematics.people import standing, walking

@@ -26,16 +26,14 @@ def averaged(before: Prior, after: Prior, share: float) -> Prior:
     if not 0 <= share <= 1:
         raise MotionloomError(f"the share must be from 0 to 1; got {share}")
     old, new = before.net.weights, after.net.weights
-    weights = {name: _mean(old[name], new[name], share) for name in new}
+    weights = {
+        name: ((1 - share) * old[name].astype(np.float64) + share * new[name]).astype(np.float32) for name in new
+    }
     notes = {
         **after.card.notes,
         "average": f"{1 - share:g} of the weights it began with, {share:g} of those it ended with",
     }
     return replace(after, net=replace(after.net, weights=weights), card=replace(after.card, notes=notes))
-
-
-def _mean(old: np.ndarray, new: np.ndarray, share: float) -> np.ndarray:
-    return ((1 - share) * old.astype(np.float64) + share * new).astype(np.float32)
 
 
 def main() -> int:

@@ -4,30 +4,121 @@
 
 The given numbers M of a state are thus signal * x_0, without noise. From a finished prior, either all its weights are
 trained on (``full``, as published) or a low-rank adapter whose input also says what is given (`weights.adapter`).
+
+What is given is random, in the ways that users give it: a path or a hand in all frames, at a few keyframes, on
+stretches, from the beginning, around a gap; whole poses; half of the body. A joint's place is measured from the root,
+so most rows that give a joint give both.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from motionloom.errors import MotionloomError
+from motionloom.features.layout import LAYOUT, WIDTH, mask
 from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.skeleton import SMPL22
 from motionloom.weights.adapter import Adapter, fingerprint
 from motionloom.weights.prior import Card, Prior, save_prior
 from motionloom_train.data.batches import FAVOUR, Batches
 from motionloom_train.data.sets import MotionSet, load_set, read_clips
 from motionloom_train.loop import Average, Training
 from motionloom_train.low_rank import AdapterNet, adapted, show, tensors_of
-from motionloom_train.masks import check_control, draw_masks
 from motionloom_train.modules import prior_module, prior_session
 from motionloom_train.nets.prior import Condition, PriorNet
 from motionloom_train.objectives import CleanError, WordBank
 from motionloom_train.prior import restandardised
 from motionloom_train.recipe import Recipe
 from motionloom_train.tensors import conditions, noised, tensor
+
+Flags = NDArray[np.bool_]
+
+CONTROLS = ("trajectory", "left_wrist", "right_wrist", "left_foot", "right_foot", "head", "any")
+"""The controls that ship. Names of `features.layout.mask` can be trained too."""
+NOTHING = 0.05
+"""Share of rows that give nothing, so that the prior stays what it was."""
+WITH_ROOT = 0.75
+"""Share of rows with a joint that give the root as well."""
+
+
+def check_control(control: str) -> None:
+    """Raise MotionloomError for a control that cannot be trained."""
+    if not control:
+        raise MotionloomError(
+            f"the recipe does not say which control to train; control is one of {', '.join(CONTROLS)}"
+        )
+    if control not in ("any", "trajectory") and not mask(control).any():
+        raise MotionloomError(f"the control {control!r} gives nothing to train; {', '.join(CONTROLS)} do")
+
+
+def draw_masks(control: str, lengths: NDArray[np.int64], frames: int, *, rng: np.random.Generator) -> Flags:
+    """(rows, frames, 263) True at the numbers that are given, one row for each of the valid ``lengths``."""
+    draw = {"any": _anything, "trajectory": _trajectory}.get(control)
+    rows = np.zeros((len(lengths), frames, WIDTH), dtype=bool)
+    for row, length in zip(rows, lengths, strict=True):
+        if rng.random() >= NOTHING:
+            if draw:
+                row |= draw(int(length), frames, rng)
+            else:
+                when = some_frames(int(length), frames, 0.55, rng)
+                row |= (when[:, None] & mask(control)) | _root(when, rng)
+    return rows
+
+
+def some_frames(length: int, frames: int, dense: float, rng: np.random.Generator) -> Flags:
+    """(frames,) when something is given: always with probability ``dense``, else at keys, in a rhythm, in a stretch,
+    at the beginning, or at both ends."""
+    chosen = np.zeros(frames, dtype=bool)
+    if rng.random() < dense:
+        return ~chosen  # padding too, as published
+    kind, half = rng.integers(5), max(length // 2, 1)
+    if kind == 0:
+        chosen[rng.choice(length, size=min(int(rng.integers(1, 7)), length), replace=False)] = True
+    elif kind == 1:
+        beat = int(rng.integers(4, 31))
+        chosen[int(rng.integers(beat)) % length : length : beat] = True
+    elif kind == 2:
+        first = int(rng.integers(length))
+        chosen[first : int(rng.integers(first, length)) + 1] = True
+    else:
+        chosen[: int(rng.integers(1, half + 1))] = True
+        if kind == 4:
+            chosen[length - int(rng.integers(1, half + 1)) : length] = True
+    return chosen
+
+
+def _trajectory(length: int, frames: int, rng: np.random.Generator) -> Flags:
+    return some_frames(length, frames, 0.7, rng)[:, None] & mask("root_horizontal")
+
+
+def _root(when: Flags, rng: np.random.Generator) -> Flags:
+    """The root's four numbers, in all frames or in those of the joint; or not at all."""
+    numbers = np.arange(WIDTH) < 4
+    if rng.random() >= WITH_ROOT:
+        return np.zeros((len(when), WIDTH), dtype=bool)
+    return np.ones_like(when)[:, None] & numbers if rng.random() < 0.7 else when[:, None] & numbers
+
+
+def _anything(length: int, frames: int, rng: np.random.Generator) -> Flags:
+    kind = rng.random()
+    if kind < 0.2:  # whole poses: places alone, or every number
+        numbers = np.arange(WIDTH) < (WIDTH if rng.random() < 0.5 else LAYOUT["ric"].stop)
+        return some_frames(length, frames, 0.0, rng)[:, None] & numbers
+    if kind < 0.3:
+        return some_frames(length, frames, 0.7, rng)[:, None] & mask(str(rng.choice(["lower_body", "upper_body"])))
+    if kind < 0.4:
+        return _trajectory(length, frames, rng)
+    when = some_frames(length, frames, 0.5, rng)
+    given = _root(when, rng)
+    for joint in rng.choice(np.arange(1, len(SMPL22)), size=int(rng.choice([1, 1, 2, 2, 3, 4, 8, 21])), replace=False):
+        own = some_frames(length, frames, 0.5, rng) if rng.random() < 0.3 else when
+        given |= own[:, None] & mask(SMPL22.names[joint])
+    return given
+
 
 HELD_WINDOW, HELD_ROWS = 80, 48
 """Frames and number of the held-out windows that are reported on."""
@@ -47,18 +138,14 @@ class Shown(nn.Module):
 class ControlledError(CleanError):
     """`CleanError` of states whose given numbers are free of noise; the masks of a step follow from (seed, step)."""
 
-    control = "any"
-    early = False
-    """Draw levels as the spacing ``early`` of `motionloom.diffusion.levels` does: most of them near pure noise."""
-
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`; ``net`` is a wrapped `Shown`."""
         drawn = self.sample(seed, step, rows)
-        if self.early:
+        if self.recipe.spacing == "early":  # most levels near pure noise
             even = drawn.level.double() / self.schedule.steps
             drawn = drawn._replace(level=(self.schedule.steps * (1 - (1 - even) ** 2)).round().long())
         rng = np.random.default_rng((seed, step, 2))
-        masks = draw_masks(self.control, drawn.cond.lengths.cpu().numpy(), drawn.clean.shape[1], rng=rng)
+        masks = draw_masks(self.recipe.control, drawn.cond.lengths.cpu().numpy(), drawn.clean.shape[1], rng=rng)
         mask = torch.from_numpy(masks).to(self.device)
         state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise * ~mask)
         return self.error(net(state, drawn.level, drawn.cond, drawn.clean, mask), drawn)
@@ -126,16 +213,8 @@ def train_control(run: Training, data: Path | str, text: TextEncoder) -> Path:
     net = _trained(recipe, prior, world.device)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=run.progress)
-    objective = ControlledError(
-        net,
-        prior.schedule,
-        batches,
-        words,
-        drop_text=recipe.drop_text,
-        displacement=recipe.displacement,
-        device=world.device,
-    )
-    objective.control, objective.early = recipe.control, recipe.spacing == "early"
+    alike = replace(recipe, early=0.0, heights=1.0)  # as published; levels go by the recipe's ``spacing``
+    objective = ControlledError(net, prior.schedule, batches, words, alike, world.device)
     held = held_out(data, prior, recipe)
 
     def export(average: Average, step: int) -> None:

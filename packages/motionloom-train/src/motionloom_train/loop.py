@@ -29,6 +29,7 @@ from motionloom.io.tensors import save_tensors
 from motionloom.io.text import plain_json
 from motionloom.weights.prior import read_tensors
 from motionloom_train.captured import Captured
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.objectives import Objective
 from motionloom_train.precision import choose
 from motionloom_train.recipe import Recipe
@@ -69,7 +70,7 @@ class Training:
     """Of PyTorch; None: a GPU where there is one."""
     stop: int | None = None
     """End early after so many steps."""
-    say: Callable[[str], None] = print
+    say: Say = print
     """Called with a line of progress now and then."""
 
     @cached_property
@@ -208,7 +209,9 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
     elif metadata["checksum"] != _checksum(tensors, metadata):
         raise MotionloomError(f"{path} is damaged: its checksum is another; train into another folder")
     try:
-        step = _step_count(metadata["step"])
+        said = metadata["step"]
+        if not (said.isascii() and said.isdigit() and len(said) <= 10):
+            raise ValueError(f"its step is {said[:20]!r}")
         _check_state(tensors, net, average, optimizer)
         net.load_state_dict(_part(tensors, "net."))
         for key, value in average.weights.items():
@@ -218,7 +221,7 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
             number, _, name = key.partition(".")
             state.setdefault(int(number), {})[name] = value
         optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
-        return step
+        return int(said)
     except (KeyError, RuntimeError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise MotionloomError(f"{path} does not belong to this recipe ({reason}); train into another folder") from None
@@ -226,12 +229,6 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
 
 def _part(tensors: Mapping[str, Tensor], beginning: str) -> dict[str, Tensor]:
     return {key.removeprefix(beginning): value for key, value in tensors.items() if key.startswith(beginning)}
-
-
-def _step_count(said: str) -> int:
-    if not (said.isascii() and said.isdigit() and len(said) <= 10):
-        raise ValueError(f"its step is {said[:20]!r}")
-    return int(said)
 
 
 def _check_state(
@@ -282,7 +279,7 @@ def train(
     on_step: Callable[[int, float, float], None] | None = None,
     capture: bool = False,
     stop: int | None = None,
-    say: Callable[[str], None] = lambda line: None,
+    say: Say = silent,
 ) -> Average:
     """Run a recipe in ``folder``, going on from the state found there; returns the averaged weights.
 
@@ -353,7 +350,7 @@ def _finite(losses: list[Tensor], step: int) -> list[float]:
     return values
 
 
-def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, say: Callable[[str], None]) -> str:
+def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, say: Say) -> str:
     """What the run multiplies in, ``bf16`` or ``float32``, the same in all processes."""
     said = recipe.amp
     if said == "auto" and (folder / STATE).is_file():
@@ -377,7 +374,7 @@ class Pace:
     STEPS, SECONDS = 10, 20.0
     """It is said after so many steps, or earlier once these seconds have gone by."""
 
-    def __init__(self, done: int, last: int, say: Callable[[str], None]) -> None:
+    def __init__(self, done: int, last: int, say: Say) -> None:
         self.left, self.say, self.told = last - done, say, False
         self.seen: list[float] = []
 
@@ -444,7 +441,7 @@ def _context(recipe: Recipe, world: World) -> Callable[[], AbstractContextManage
 class Log:
     """A progress line with loss, throughput and remaining time; TensorBoard files where that is installed."""
 
-    def __init__(self, folder: Path, recipe: Recipe, *, every: int = 50, say: Callable[[str], None] = print) -> None:
+    def __init__(self, folder: Path, recipe: Recipe, *, every: int = 50, say: Say = print) -> None:
         self.recipe, self.every, self.say = recipe, every, say
         self.losses: list[float] = []
         self.seconds = 0.0

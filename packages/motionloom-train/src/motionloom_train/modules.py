@@ -7,21 +7,18 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.runtime.pair import PairSession
 from motionloom.runtime.predictor import PredictorSession
 from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.text.minilm import HEAD_WIDTH, WORDS, MiniLM, sizes_of, unpacked
-from motionloom.runtime.text.quantise import dequantise
+from motionloom.runtime.text.minilm import MiniLM, sizes_of, unpacked
 from motionloom.weights.adapter import NET
 from motionloom.weights.container import check
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Prior
-from motionloom_train.export import pair_graph, predictor_graph, prior_graphs, text_graph
+from motionloom_train.export import predictor_graph, prior_graphs, text_graph
 from motionloom_train.nets.pair import PairNet, Talk
 from motionloom_train.nets.predictor import TransLinear
 from motionloom_train.nets.prior import PriorNet
-from motionloom_train.nets.text.bert import Bert
 from motionloom_train.nets.unfilled import unfilled
 
 
@@ -45,15 +42,6 @@ def pair_module(block: PairBlock, prior: Prior) -> PairNet:
     return made.eval().requires_grad_(False)
 
 
-def pair_session(net: PairNet) -> PairSession:
-    """A module as a session."""
-    base, mean, std, _ = net._base
-    config, prior = net.talk.config, prior_session(base)
-    graph = pair_graph(config, prior.config)
-    numbers = mean.cpu().numpy(), std.cpu().numpy()
-    return PairSession(config, arrays(net.talk), graph, prior, net.schedule, *numbers)
-
-
 def predictor_module(predictor: Predictor) -> TransLinear:
     """A predictor's network as a module in evaluation mode, without gradients."""
     return _module(TransLinear, predictor.net, "the predictor")
@@ -69,19 +57,6 @@ def _module(kind: Any, session: PriorSession | PredictorSession, what: str) -> A
     with unfilled():
         module = kind(session.config)
     fill(module, {key.removeprefix(NET): value for key, value in session.weights.items()}, what)
-    return module.eval().requires_grad_(False)
-
-
-def text_module(text: MiniLM) -> Bert:
-    """The embedded text encoder's network as a module."""
-    tensors = text.to_tensors()
-    weights = unpacked(tensors)
-    sizes = sizes_of(weights)
-    weights[WORDS] = dequantise(tensors[WORDS], tensors[f"{WORDS}.scale"])
-    heads = sizes["width"] // HEAD_WIDTH
-    with unfilled():
-        module = Bert(vocabulary=len(text.vocabulary), heads=heads, **sizes)
-    fill(module, weights, "the text encoder")
     return module.eval().requires_grad_(False)
 
 

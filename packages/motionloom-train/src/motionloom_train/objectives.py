@@ -1,6 +1,5 @@
 """What a step of training minimises. An objective owns the modules and turns a batch into one number."""
 
-from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -12,9 +11,11 @@ from motionloom.features.humanml import displacements
 from motionloom.features.layout import FEET, LAYOUT
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom_train.data.batches import Batch, Batches
+from motionloom_train.data.progress import Say
 from motionloom_train.low_rank import AdapterNet
 from motionloom_train.nets.prior import Condition, PriorNet, condition
-from motionloom_train.tensors import tensor
+from motionloom_train.recipe import Recipe
+from motionloom_train.tensors import number_of, tensor
 
 WEIGHTS = {
     "yaw_velocity": 6.0,
@@ -52,7 +53,7 @@ class WordBank:
         *,
         room: int = 40,
         device: str = "cpu",
-        progress: Callable[[str], None] = print,
+        progress: Say = print,
     ) -> None:
         starts = [0]
         tokens, pooled = [], []
@@ -97,9 +98,9 @@ class CleanError:
     """Mean squared error of the estimate of x0 at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
 
     The mean is over valid frames and numbers of each row, then over rows, as published (specification of MDM's loss).
-    ``early``: share of the samples whose level is drawn as often as samplers go there, most of them near pure noise,
-    where it is decided what a motion will show. ``displacement`` times the `displacement_error` comes on top: MDM's
-    geometric losses (eq. 4 and 5), which its published text models leave out.
+    The recipe's ``early``, ``heights``, ``drop_text`` and ``displacement`` are heeded: early levels lie near pure
+    noise, where it is decided what a motion will show, and `displacement_error` is in place of MDM's geometric losses
+    (eq. 4 and 5), which its published text models leave out.
     """
 
     def __init__(
@@ -108,18 +109,13 @@ class CleanError:
         schedule: Schedule,
         batches: Batches,
         words: WordBank,
-        *,
-        drop_text: float = 0.1,
-        weights: dict[str, float] = WEIGHTS,
-        displacement: float = 0.0,
-        early: float = 0.0,
-        heights: float = 1.0,
+        recipe: Recipe | None = None,
         device: str = "cpu",
     ) -> None:
         self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
-        self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
+        self.recipe, self.device = recipe or Recipe(), device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
-        self.scale = feature_scale(weights, heights).to(device)
+        self.scale = feature_scale(self.recipe.heights).to(device)
         self._signal, self._spread = (tensor(table, device).float() for table in (schedule.signal, schedule.noise))
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
@@ -140,7 +136,7 @@ class CleanError:
 
     def number(self, seed: int, step: int) -> int:
         """See `motionloom_train.captured.Capturable`."""
-        return int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0])
+        return number_of(seed, step)
 
     def sample(self, seed: int, step: int, rows: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
@@ -155,32 +151,32 @@ class CleanError:
         rows = len(batch.lengths)
         level = self.random_levels(rows, generator)
         noise = torch.randn(batch.features.shape, generator=generator, device=self.device)
-        keep = torch.rand(rows, generator=generator, device=self.device) >= self.drop_text
+        keep = torch.rand(rows, generator=generator, device=self.device) >= self.recipe.drop_text
         return Drawn(batch.features, level, noise, self.words.condition(batch.texts, batch.lengths).choose(keep))
 
     def random_levels(self, rows: int, generator: torch.Generator) -> Tensor:
         """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
         how: dict[str, Any] = {"generator": generator, "device": generator.device}
         level = torch.randint(1, self.schedule.steps + 1, (rows,), **how)
-        if not self.early_share:
+        if not self.recipe.early:
             return level
         often = (self.schedule.steps * (1 - torch.rand(rows, **how) ** 2)).ceil().clamp(min=1).long()
-        return torch.where(torch.rand(rows, **how) < self.early_share, often, level)
+        return torch.where(torch.rand(rows, **how) < self.recipe.early, often, level)
 
     def error(self, denoised: Tensor, drawn: Drawn) -> Tensor:
         """What an estimate of the clean data costs."""
         error = masked_error(denoised, drawn.clean, drawn.cond.lengths, self.scale)
-        if self.displacement:
+        if self.recipe.displacement:
             moved = displacement_error(denoised, drawn.clean, drawn.cond.lengths, self.mean, self.std)
-            error = error + self.displacement * moved
+            error = error + self.recipe.displacement * moved
         return error
 
 
-def feature_scale(weights: dict[str, float] = WEIGHTS, heights: float = 1.0) -> Tensor:
+def feature_scale(heights: float = 1.0) -> Tensor:
     """(263,) how much each feature's error counts, 1 on average; ``heights``: how much more that of a height does."""
     scale = torch.ones(max(block.stop for block in LAYOUT.values()))
     for name, block in LAYOUT.items():
-        scale[block] = weights[name]
+        scale[block] = WEIGHTS[name]
     scale[LAYOUT["root_height"]] *= heights
     scale[LAYOUT["ric"]][1::3] *= heights
     return scale / scale.mean()

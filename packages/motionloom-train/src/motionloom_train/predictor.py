@@ -26,7 +26,7 @@ from motionloom_train.loop import Average, Training, compiled
 from motionloom_train.modules import predictor_module, predictor_session
 from motionloom_train.nets.predictor import TransLinear
 from motionloom_train.recipe import Recipe, parse_table
-from motionloom_train.tensors import noised, tensor
+from motionloom_train.tensors import noised, number_of, tensor
 
 WHOLE_PAST = 0.75
 """How often all of the past is given; else its last 2 frames or more."""
@@ -187,7 +187,7 @@ class Completion:
         The latter is standardised and weighted by its spread, between metres and equal weights for all frequencies.
         """
         p, drawn = self.predictor, self.windows.draw(seed, step, rows)
-        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        generator = torch.Generator().manual_seed(number_of(seed, step))
         low = 2 if p.variant == "published" else 1  # the published code never trains its first noisy level
         level = torch.randint(low, p.schedule.steps + 1, (rows,), generator=generator).to(self.device)
         clean = tensor(p.to_state(drawn.features, drawn.pose), self.device)

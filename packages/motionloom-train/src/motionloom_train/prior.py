@@ -4,11 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS
+from motionloom.runtime.text.known import Known, known_sentences
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.weights.container import read_tensors
 from motionloom.weights.prior import (
@@ -18,9 +21,9 @@ from motionloom.weights.prior import (
     load_prior,
     save_prior,
 )
+from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.batches import FAVOUR, Batches
 from motionloom_train.data.sets import MotionSet, load_set
-from motionloom_train.known import known_table
 from motionloom_train.loop import Average, Training
 from motionloom_train.modules import prior_module, prior_session
 from motionloom_train.modules import text_encoder as embedded
@@ -28,6 +31,41 @@ from motionloom_train.nets.prior import NetConfig, PriorNet
 from motionloom_train.objectives import CleanError, Conditioned, WordBank
 from motionloom_train.recipe import Recipe
 from motionloom_train.tensors import tensor
+
+WRITTEN = {"human": "captions that people wrote", "index": "descriptions of the collections"}
+"""What the table calls the groups of items that are no single action."""
+
+
+def known_table(motions: MotionSet, encoder: TextEncoder) -> Known:
+    """The table of a set's sentences and of the seconds of each of its actions (groups of items).
+
+    A named action and a measured label of one name are one action. Each is in the table with at least one sentence.
+    Frames that several items of an action share count once; mirrored and other made copies count as more motion.
+    """
+    frames: dict[str, list[tuple[int, int]]] = {}
+    texts: dict[str, dict[int, None]] = {}
+    for item in motions.items:
+        name = item.group.removeprefix(PREFIX)
+        frames.setdefault(name, []).append((item.start, item.start + item.frames))
+        texts.setdefault(name, {}).update(dict.fromkeys(item.texts))
+    seconds = {group: _covered(spans) / FPS for group, spans in frames.items()}
+    listed = sorted(seconds, key=lambda group: (group in WRITTEN, -seconds[group], group))
+    numbers = dict.fromkeys(number for group in listed for number in texts[group])
+    return known_sentences(
+        [motions.texts[number] for number in numbers],
+        {WRITTEN.get(g, g): seconds[g] for g in listed},
+        encoder,
+        first=[motions.texts[next(iter(texts[group]))] for group in listed if texts[group]],
+    )
+
+
+def _covered(spans: list[tuple[int, int]]) -> int:
+    """Frames in the union of half-open spans."""
+    covered, reached = 0, 0
+    for first, last in np.array(sorted(spans)):
+        covered += max(0, int(last) - max(int(first), reached))
+        reached = max(reached, int(last))
+    return covered
 
 
 def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
@@ -48,17 +86,7 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
     motions = replace(motions, features=motions.features.to(world.device))
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, device=world.device, progress=run.progress)
-    objective = CleanError(
-        net,
-        schedule,
-        batches,
-        words,
-        drop_text=recipe.drop_text,
-        displacement=recipe.displacement,
-        early=recipe.early,
-        heights=recipe.heights,
-        device=world.device,
-    )
+    objective = CleanError(net, schedule, batches, words, recipe, world.device)
     known = known_table(motions, text)
 
     def export(average: Average, step: int) -> None:

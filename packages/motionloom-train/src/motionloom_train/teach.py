@@ -25,6 +25,7 @@ from motionloom.tasks.text import sample_features
 from motionloom.weights.adapter import TAUGHT, Adapter, origin
 from motionloom.weights.prior import Prior
 from motionloom_train.data.examples import Example
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.words import LABELS, imperative
 from motionloom_train.loop import Average, World, train
 from motionloom_train.low_rank import AdapterNet, tensors_of
@@ -33,7 +34,7 @@ from motionloom_train.nets.prior import Condition
 from motionloom_train.objectives import Conditioned, WordBank, displacement_error, feature_scale, masked_error
 from motionloom_train.precision import CHOICES, choose
 from motionloom_train.recipe import Recipe
-from motionloom_train.tensors import find_device, noised, tensor
+from motionloom_train.tensors import find_device, noised, number_of, tensor
 
 WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
 """Frames of the windows that a step sees, and how often."""
@@ -63,7 +64,6 @@ DISPLACEMENT = 0.5
 
 _WHOLE = re.compile(r"(an?|the|he|she|they|my|our|his|her|some\w*|[a-z]+ing)\b")
 """How a known sentence begins that needs no subject before it."""
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +82,7 @@ def teach(
     lesson: Lesson | None = None,
     *,
     device: str = "cpu",
-    say: Say = lambda line: None,
+    say: Say = silent,
 ) -> Adapter:
     """An adapter that makes ``prior`` show what the examples show where their captions are asked for.
 
@@ -200,7 +200,7 @@ class Teaching:
         window = int(rng.choice(WINDOWS, p=SHARES))
         kept = min(round(self.keep * rows), rows - 1)
         clean, texts, lengths = self._rows(rng, window, rows, kept)
-        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        generator = torch.Generator().manual_seed(number_of(seed, step))
         even = torch.rand(rows, generator=generator, dtype=torch.float64)
         level = (self.schedule.steps * (1 - even**2)).ceil().long().clamp(1, self.schedule.steps)  # as samplers go
         noise = torch.randn(clean.shape, generator=generator).to(clean)

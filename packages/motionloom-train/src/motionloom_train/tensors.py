@@ -1,9 +1,10 @@
-"""From arrays, which sampling computes with, to the tensors that training computes with."""
+"""From arrays, which sampling computes with, to the tensors that training computes with, and what computes them."""
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from motionloom import runtime
 from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
 from motionloom.runtime import prior_condition
@@ -28,6 +29,11 @@ def noised(schedule: Schedule, clean: Tensor, level: Tensor, noise: Tensor) -> T
     return signal * clean + spread * noise
 
 
+def number_of(seed: int, step: int) -> int:
+    """What the random numbers of a step begin with."""
+    return int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0])
+
+
 def find_device(name: str) -> torch.device:
     """The device of that name; raises MotionloomError where this machine or this PyTorch has none."""
     try:
@@ -37,3 +43,9 @@ def find_device(name: str) -> torch.device:
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         reason = " ".join(str(error).split())[:80]
         raise MotionloomError(f"the device {name!r} cannot be used ({reason}); cpu always can") from None
+
+
+def set_threads(count: int) -> None:
+    """Modules from now on, and sessions that are opened from now on, compute with so many threads."""
+    torch.set_num_threads(count)
+    runtime.set_threads(count)

@@ -9,7 +9,7 @@ from motionloom.errors import MotionloomError
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
-from motionloom_train.data.clip_check import check_clip, check_file
+from motionloom_train.data.examples import check_clip, check_file
 from tests.kinematics import people
 
 

@@ -7,8 +7,8 @@ from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom_train.data import augment
+from motionloom_train.data.augment import SHORTEST, Idle, extended, find_idle
 from motionloom_train.data.clips import Clip
-from motionloom_train.data.idle import SHORTEST, Idle, extended, find_idle
 from tests.kinematics import people
 
 

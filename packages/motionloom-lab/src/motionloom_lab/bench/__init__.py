@@ -1,8 +1,8 @@
 """`motionloom bench`: speed as ratios within one run, so that they mean the same on any machine.
 
 Times are medians of interleaved repeats. Nothing here is a test: a busy machine makes it slower, not wrong.
-`speed` has the tools and what `generate` costs, `start` what whole processes take, `long` what `compose` costs,
-`prediction` what futures cost.
+`speed` has the tools, what `generate` costs and what whole processes take, `long` what `compose` costs, `prediction`
+what futures cost.
 """
 
 import os
@@ -27,8 +27,9 @@ from motionloom_lab.bench.speed import (
     linearity,
     process,
     speed_of_default,
+    starts,
 )
-from motionloom_lab.bench.start import starts
+from motionloom_train.data.progress import Say, silent
 
 __all__ = ["Entry", "Process", "Sampling", "bench", "bench_prediction", "machine", "process", "table"]
 
@@ -42,7 +43,7 @@ def bench(
     weights: str = "default",
     sizes: Sequence[int] = (1024, 2048),
     run: Callable[[Sequence[str]], Process] = process,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Say = silent,
 ) -> dict[str, Any]:
     """Single motions, long motion (minutes, unless ``quick``), or both, as plain data.
 
@@ -76,9 +77,7 @@ def bench(
     return found
 
 
-def bench_prediction(
-    predictor: Predictor, *, quick: bool = False, progress: Callable[[str], None] = lambda line: None
-) -> dict[str, Any]:
+def bench_prediction(predictor: Predictor, *, quick: bool = False, progress: Say = silent) -> dict[str, Any]:
     """What futures cost, as plain data."""
     about = machine(predictor)
     entries = cost_of_futures(predictor, repeats=1 if quick else 5, timed_steps=2 if quick else 10, progress=progress)

@@ -26,6 +26,7 @@ from motionloom_lab.papers.double_take import (
     sandwiches,
     second_take,
 )
+from motionloom_train.data.progress import Say, silent
 
 ACTIONS = (
     "walks forward",
@@ -112,7 +113,7 @@ def long_motion(
     *,
     weights: str = "default",
     run: Callable[[Sequence[str]], Process] = process,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Say = silent,
 ) -> Measured:
     """Measure; times of all lengths and of the published steps are taken in turns, memory afterwards."""
     texts = [prompts(round(seconds / course.each)) for seconds in course.lengths]

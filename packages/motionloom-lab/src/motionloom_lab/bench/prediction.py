@@ -12,13 +12,14 @@ from motionloom_lab.bench.speed import Entry, timed
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom_lab.papers.humanmac import published_futures
 from motionloom_train.data.prediction import Protocol, Recording
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.predictor import Settings, Windows, new_predictor
 
 COUNT, PUBLISHED_STEPS = 50, 100
 
 
 def cost_of_futures(
-    predictor: Predictor, *, repeats: int, timed_steps: int = 10, progress: Callable[[str], None] = lambda line: None
+    predictor: Predictor, *, repeats: int, timed_steps: int = 10, progress: Say = silent
 ) -> list[Entry]:
     """Seconds of our default, and how often it fits into the published recipe: of these weights, of the published net.
 
@@ -37,21 +38,18 @@ def cost_of_futures(
     ]
     ours, same, theirs = timed(jobs, repeats, warm=3)
     same, theirs = (seconds * PUBLISHED_STEPS / timed_steps for seconds in (same, theirs))
+    size = sum(values.size for values in predictor.net.weights.values())
     how = f"{STEPS} steps: {ours:.2f} s; {PUBLISHED_STEPS} published steps reckoned from {timed_steps} timed ones"
     return [
         Entry(f"{COUNT} futures of {rest / predictor.fps:g} s", ours, "s", "< 2 on 2 cores", ours < 2, how),
         _times("published network and recipe / ours", theirs, ours, "28,401,712 parameters"),
-        _times("published recipe of these weights / ours", same, ours, f"{_size(predictor):,} parameters"),
+        _times("published recipe of these weights / ours", same, ours, f"{size:,} parameters"),
     ]
 
 
 def _times(name: str, theirs: float, ours: float, what: str) -> Entry:
     ratio = theirs / ours
     return Entry(name, ratio, "times", ">= 20", ratio >= 20, f"{what}: {theirs:.1f} s")
-
-
-def _size(predictor: Predictor) -> int:
-    return sum(values.size for values in predictor.net.weights.values())
 
 
 def _standing(frames: int, joints: int) -> np.ndarray:

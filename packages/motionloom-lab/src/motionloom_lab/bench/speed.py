@@ -1,4 +1,4 @@
-"""Tools that time and weigh, and what `generate` costs."""
+"""Tools that time and weigh, what `generate` costs, and what whole commands take beside imports of their libraries."""
 
 import os
 import re
@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -129,7 +130,7 @@ def efficiency(
 
     squares = [np.random.default_rng(0).standard_normal((n, n), np.float32) for n in sizes]
     work = guided_flops(prior, x, level)
-    spent, *products = timed([_call(denoise, x, level), *[_product(a) for a in squares]], repeats)
+    spent, *products = timed([partial(denoise, x, level), *(partial(np.matmul, a, a) for a in squares)], repeats)
     best = max(2 * n**3 / t for n, t in zip(sizes, products, strict=True))
     share = 100 * work / spent / best
     note = (
@@ -139,16 +140,12 @@ def efficiency(
     return Entry(f"guided call, {rows} motion(s)", share, "% of a matrix product", ">= 70", share >= 70, note)
 
 
-def _product(a: np.ndarray) -> Callable[[], np.ndarray]:
-    return lambda: a @ a
-
-
 def linearity(prior: Prior, how: Sampling, *, counts: Sequence[int], seconds: float, repeats: int) -> Entry:
     """Time of a guided call by the number of motions: does each further one cost the same?"""
     jobs = []
     for count in counts:
         denoise, x = guided(prior, count, guidance=how.guidance), noise(prior, count, seconds)
-        jobs.append(_call(denoise, x, max(1, prior.schedule.steps // 2)))
+        jobs.append(partial(denoise, x, max(1, prior.schedule.steps // 2)))
     times = timed(jobs, repeats)
     slope, start, r2 = fit(counts, times)
     each = times[-1] / counts[-1] / (times[0] / counts[0])
@@ -160,13 +157,6 @@ def linearity(prior: Prior, how: Sampling, *, counts: Sequence[int], seconds: fl
     return Entry(
         "time is linear in motions", r2, "r^2", ">= 0.99, none dearer than 1.1", r2 >= 0.99 and each <= 1.1, note
     )
-
-
-def _call(denoise: Denoiser, x: np.ndarray, level: int) -> Callable[[], None]:
-    def call() -> None:
-        denoise(x, level)
-
-    return call
 
 
 def fit(counts: Sequence[float], times: Sequence[float]) -> tuple[float, float, float]:
@@ -223,7 +213,7 @@ def process(arguments: Sequence[str]) -> Process:
 
 
 def commands(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Process] = process) -> list[Entry]:
-    """`--help`, and the memory of a 10-second generation; `start` has what other commands take."""
+    """`--help`, and the memory of a 10-second generation; `starts` has what other commands take."""
     with tempfile.TemporaryDirectory() as folder:
         out = str(Path(folder) / "walk.bvh")
         make = ["generate", PROMPT, "--weights", weights, "--seed", "0", "--out", out]
@@ -236,3 +226,49 @@ def commands(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Proce
             "memory of a 10-second generation", memory, "MB", "< 1500", memory < 1500, "peak resident, whole process"
         ),
     ]
+
+
+LIBRARIES = ("-c", "import numpy, onnxruntime")
+SECONDS = 5
+"""Length of the motion that is made, read, written and drawn."""
+MOST_MAKING, MOST_READING = 10.0, 3.5
+"""Times an import of NumPy and ONNX Runtime."""
+
+
+def starts(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Process] = process) -> list[Entry]:
+    """A sentence to BVH, and `info`, `export` and `view` of it, over an import of the libraries.
+
+    The processes run in turns, after one round that is not measured. ``weights``: name or file. ``run``: runs Python
+    with ``-c`` and code, `motionloom` with anything else.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        clip = str(Path(folder) / "walk.bvh")
+        commands = {
+            "libraries": LIBRARIES,
+            "generate": ("generate", PROMPT, "--weights", weights, "--seconds", str(SECONDS), "--out", clip),
+            "info": ("info", clip),
+            "export": ("export", clip, str(Path(folder) / "walk.glb")),
+            "view": ("view", clip, "--out", str(Path(folder) / "walk.png")),
+        }
+        rounds = [{name: run(words) for name, words in commands.items()} for _ in range(repeats + 1)][1:]
+    taken = {name: median(one[name].seconds for one in rounds) for name in commands}
+    busy = {name: median(one[name].processor for one in rounds) for name in commands}
+    return [_entry(name, taken, busy) for name in commands if name != "libraries"]
+
+
+def _entry(name: str, taken: dict[str, float], busy: dict[str, float]) -> Entry:
+    most = MOST_MAKING if name == "generate" else MOST_READING
+    ratio = taken[name] / taken["libraries"]
+    note = (
+        f"{taken[name]:.2f} s of {taken['libraries']:.2f}; "
+        f"of processor time {busy[name]:.2f} of {busy['libraries']:.2f}, "
+        f"{busy[name] / busy['libraries']:.2f} times; {SECONDS} s of motion"
+    )
+    return Entry(
+        f"motionloom {name}, whole process / import numpy, onnxruntime",
+        ratio,
+        "times",
+        f"<= {most}",
+        ratio <= most,
+        note,
+    )

@@ -25,10 +25,8 @@ def run_import(arguments: argparse.Namespace) -> None:
     """``motionloom import CHECKPOINT``."""
     from motionloom.io.atomic import check_place
     from motionloom.weights.prior import save_prior
-    from motionloom_lab.papers.commdm import is_pair
-    from motionloom_lab.papers.humanmac_checkpoint import is_humanmac
-    from motionloom_lab.papers.mdm import read_published
-    from motionloom_lab.papers.published_priors import import_published
+    from motionloom_lab.papers.mdm import is_pair, read_published
+    from motionloom_lab.papers.published_priors import import_published, is_humanmac
 
     if arguments.out.suffix != ".safetensors":
         raise MotionloomError(f"weights are written as .safetensors; {arguments.out.name} has another suffix")
@@ -74,7 +72,7 @@ def _imported_block(arguments: argparse.Namespace, prior: "Prior") -> "PairBlock
 
 def _import_predictor(arguments: argparse.Namespace) -> None:
     from motionloom.weights.predictor import save_predictor
-    from motionloom_lab.papers.humanmac_checkpoint import import_humanmac
+    from motionloom_lab.papers.published_priors import import_humanmac
 
     if arguments.mean or arguments.std:
         raise MotionloomError("HumanMAC works on metres as they are: no --mean and no --std")

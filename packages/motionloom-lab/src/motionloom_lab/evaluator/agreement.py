@@ -1,6 +1,6 @@
 """Does an evaluator rank generated motions as physics does: does it score those higher that do what the words say?"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from motionloom_lab.metrics.actions import measure
 from motionloom_lab.metrics.obedience import CHECKS, Check
 from motionloom_lab.report.report import Report, Row, Value
 from motionloom_lab.report.tables import columns
+from motionloom_train.data.progress import Say, silent
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "as generate": {},
@@ -89,7 +90,7 @@ def agreement(
     seeds: int = 4,
     checks: Sequence[Check] = CHECKS,
     settings: dict[str, dict[str, Any]] = SETTINGS,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Say = silent,
 ) -> Report:
     """An evaluator beside physical obedience, for several ways to sample a prior."""
     if not 1 <= seeds <= 1000 or not checks:

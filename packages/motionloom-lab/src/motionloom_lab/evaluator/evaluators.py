@@ -1,7 +1,7 @@
 """What every text-motion evaluator gives: sentences and motions as points of one Euclidean space.
 
-FID, R-precision and the other numbers of `lab.metrics.retrieval` and `lab.metrics.frechet` are distances in that
-space. They mean something only within one evaluator: a value from one is never compared with a value from another.
+FID, R-precision and the other numbers of `lab.metrics.retrieval` are distances in that space. They mean
+something only within one evaluator: a value from one is never compared with a value from another.
 """
 
 from collections.abc import Sequence
@@ -51,15 +51,16 @@ def load_evaluator(name_or_path: str) -> Evaluator:
 
     Raises MotionloomError for a file that is missing, damaged or of another kind.
     """
-    from motionloom_lab.evaluator.own import is_own, load_own
-    from motionloom_lab.papers.guo import is_guo, load_guo  # late: both are written in terms of this module
+    from motionloom_lab.evaluator.net import is_embedder
+    from motionloom_lab.evaluator.own import load_own
+    from motionloom_lab.papers.guo import is_guo, load_guo  # late: all are written in terms of this module
 
     if name_or_path == "own":
         return load_own()
     path = Path(name_or_path)
     if not path.is_file():
         raise MotionloomError(f"no evaluator {name_or_path!r}: it is not a file, and the shipped one is called 'own'")
-    if is_own(path):
+    if is_embedder(path):
         return load_own(path)
     if is_guo(path):
         return load_guo(path)

@@ -22,6 +22,7 @@ from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.weights.container import Container, check, halved
+from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_train.modules import arrays, shapes
 from motionloom_train.tensors import tensor
 
@@ -196,7 +197,7 @@ def standardised(x: Tensor, lengths: Tensor, mean: Tensor, std: Tensor) -> Tenso
 
 @dataclass(frozen=True, eq=False)
 class Embedder:
-    """A finished evaluator: everything its file holds, and the text encoder that the file names."""
+    """A finished `Evaluator`: everything its file holds, and the text encoder that the file names."""
 
     net: EvaluatorNet
     mean: Tensor
@@ -205,6 +206,16 @@ class Embedder:
     text: TextEncoder
     card: dict[str, str]
     """name, licence, data, made: see `CARD`."""
+
+    @property
+    def name(self) -> str:
+        """See `Evaluator`."""
+        return self.card["name"]
+
+    @property
+    def about(self) -> dict[str, str]:
+        """See `Evaluator`."""
+        return dict(self.card)
 
     @torch.no_grad()
     def motions(self, features: Sequence[np.ndarray]) -> np.ndarray:
@@ -231,11 +242,11 @@ class Embedder:
         return found
 
     @torch.no_grad()
-    def texts(self, texts: Sequence[str]) -> np.ndarray:
-        """Sentences to unit vectors (texts, embed) float64."""
-        found = np.zeros((len(texts), self.net.config.embed))
-        for first in range(0, len(texts), ROWS):
-            said = self.text.encode(list(texts[first : first + ROWS]))
+    def texts(self, captions: Sequence[Caption]) -> np.ndarray:
+        """Sentences to unit vectors (captions, embed) float64; tokens are not read."""
+        found = np.zeros((len(captions), self.net.config.embed))
+        for first in range(0, len(captions), ROWS):
+            said = self.text.encode([caption.text for caption in captions[first : first + ROWS]])
             found[first : first + ROWS] = self.net.text(tensor(said.tokens), tensor(said.mask)).double().numpy()
         return found
 

@@ -21,11 +21,11 @@ from motionloom.kinematics.physics import Array
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.evaluator.net import Embedder, is_embedder, load_embedder
 from motionloom_lab.evaluator.pairs import TIMED, backwards
-from motionloom_lab.metrics.frechet import fid, fid_bias
-from motionloom_lab.metrics.retrieval import matching_distance, r_precision
+from motionloom_lab.metrics.retrieval import fid, fid_bias, matching_distance, r_precision
 from motionloom_lab.report.report import Report, Row, Value
 from motionloom_lab.report.tables import columns
 from motionloom_train.data.clips import Clip
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.sets import read_clips
 from motionloom_train.data.words import LABELS, mirror_text
 from motionloom_train.prior import text_encoder
@@ -45,36 +45,11 @@ SPEEDS = (0.5, 0.71, 1.41, 2.0)
 COLUMNS = columns("evaluator")
 
 
-@dataclass(frozen=True)
-class OwnEvaluator:
-    """An `Embedder` as an `Evaluator`."""
-
-    embedder: Embedder
-
-    @property
-    def name(self) -> str:
-        """See `Evaluator`."""
-        return self.embedder.card["name"]
-
-    @property
-    def about(self) -> dict[str, str]:
-        """See `Evaluator`."""
-        return dict(self.embedder.card)
-
-    def motions(self, features: Sequence[np.ndarray]) -> Array:
-        """See `Evaluator`; at least 4 frames each, made for 1 to 10 seconds."""
-        return self.embedder.motions(features)
-
-    def texts(self, captions: Sequence[Caption]) -> Array:
-        """See `Evaluator`; tokens are not read."""
-        return self.embedder.texts([caption.text for caption in captions])
-
-
-def load_own(path: Path | None = None) -> OwnEvaluator:
+def load_own(path: Path | None = None) -> Embedder:
     """The evaluator in a file, or the shipped one; its text encoder is the one inside the shipped prior."""
     if path is None and SHIPPED not in evaluators():
         raise MotionloomError("no evaluator ships with this installation; make one with 'motionloom train evaluator'")
-    return OwnEvaluator(load_embedder(path or evaluators()[SHIPPED], text_encoder(TEXT)))
+    return load_embedder(path or evaluators()[SHIPPED], text_encoder(TEXT))
 
 
 def evaluators() -> dict[str, Path]:
@@ -83,11 +58,6 @@ def evaluators() -> dict[str, Path]:
 
     folder = Path(str(resources.files("motionloom"))) / "weights"
     return {path.stem: path for path in finished(folder, "*.safetensors") if is_embedder(path)}
-
-
-def is_own(path: Path) -> bool:
-    """True for a file of `motionloom train evaluator`."""
-    return is_embedder(path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +252,7 @@ def validate(
     sources: Sequence[str] = ("cmu",),
     repeats: int = 20,
     seed: int = 0,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Say = silent,
 ) -> Report:
     """What an evaluator notices on the held-out clips of a built set; one row per damage and amount.
 

@@ -26,6 +26,8 @@ ALIKE = 0.7
 """Cosine of two pooled sentence vectors above which they say the same and are no negatives of each other."""
 HARD = 0.33
 """Most rows of a batch that get a contrary motion or sentence."""
+DERIVED = re.compile(r"_(looped|reversed|bent\d*)$")
+"""The end of names of clips made of one recording: ``M05_01_bent2`` and ``M05_01`` are one, mirrored ones apart."""
 _ONWARD = {"forward": "backward", "forwards": "backwards", "backward": "forward", "backwards": "forwards"}
 _ONWARD_WORD = re.compile(r"\b(forwards?|backwards?)\b", re.IGNORECASE)
 _SENSES = tuple(
@@ -122,7 +124,7 @@ class Pairs:
         clips = read_clips(folder, sources=sources)
         ends = np.cumsum([len(clip.features) for clip in clips])
         known: dict[str, int] = {}
-        families = [known.setdefault(_take(clip.name), len(known)) for clip in clips]
+        families = [known.setdefault(DERIVED.sub("", clip.name), len(known)) for clip in clips]
         places = np.searchsorted(ends, [item.start for item in data.items], side="right")
         return Pairs(data, [families[place] for place in places], hard=hard)
 
@@ -190,11 +192,6 @@ class Pairs:
             motions.append(humanml.mirror(motion) if mirrored else backwards(motion))
             rows.append(row)
         return motions, rows
-
-
-def _take(name: str) -> str:
-    """The recording behind a clip, mirrored ones apart: ``M05_01_bent2`` and ``M05_01`` are one."""
-    return re.sub(r"_(looped|reversed|bent\d*)$", "", name)
 
 
 def negatives(batch: PairBatch, pooled: Tensor, directions: Tensor) -> Tensor:

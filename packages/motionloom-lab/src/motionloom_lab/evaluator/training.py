@@ -24,6 +24,7 @@ from motionloom_lab.evaluator.pairs import Pairs, negatives, senses
 from motionloom_train.loop import Average, Training
 from motionloom_train.objectives import WordBank
 from motionloom_train.recipe import Recipe
+from motionloom_train.tensors import number_of
 
 SHARPEST = 4.6
 """Logarithm: the temperature does not go below 0.01."""
@@ -51,7 +52,7 @@ class Contrast:
         """See `Objective.loss`."""
         batch = self.pairs.draw(seed, step, rows)
         said = self.words.condition(batch.texts, batch.lengths[:1].expand(len(batch.texts)))
-        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        generator = torch.Generator().manual_seed(number_of(seed, step))
         seen = said.words & (torch.rand(said.words.shape, generator=generator) >= FORGET)
         seen[:, 0] = True
         lengths = batch.lengths.to(self.device)

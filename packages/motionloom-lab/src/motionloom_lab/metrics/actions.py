@@ -3,8 +3,6 @@
 ``positions`` (frames, 22, 3) metres on the uniform person, SMPL order, the floor near y = 0.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from motionloom.kinematics import gestures as g
@@ -22,7 +20,8 @@ MEANING: dict[str, str] = read_table("motionloom_lab.suites", "actions.toml")
 def measure(positions: np.ndarray, fps: float) -> Measures:
     """All numbers of `MEANING` for one clip, rounded to four places."""
     p = np.asarray(positions, dtype=np.float64)
-    return {name: round(float(value), 4) for part in _PARTS for name, value in part(p, fps).items()}
+    found = {**_path(p, fps), **_legs(p, fps), **_arms(p, fps), **_posture(p, fps), "whole": wholeness(p)}
+    return {name: round(float(value), 4) for name, value in found.items()}
 
 
 def _path(p: Array, fps: float) -> Measures:
@@ -101,10 +100,3 @@ def _posture(p: Array, fps: float) -> Measures:
         "mean_stir": float(stir.mean()),
         "stir": float(np.percentile(stir.max(axis=1), 90)),
     }
-
-
-def _body(p: Array, fps: float) -> Measures:
-    return {"whole": wholeness(p)}
-
-
-_PARTS: tuple[Callable[[Array, float], Measures], ...] = (_path, _legs, _arms, _posture, _body)

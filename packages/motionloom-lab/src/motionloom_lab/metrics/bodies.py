@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.kinematics.physics import Array, J
@@ -65,14 +64,16 @@ def signals(positions: Array, *, own: bool = False) -> dict[str, Array]:
     own: whether the skeleton is the recording's own; the height of the head is then that of the uniform person in the
     same pose.
     """
-    bend = angles(positions)
+    bend, middles = angles(positions), _middles(positions)
+    legs = middles[1] - middles[0]
+    upright = (np.abs(bend.knees).max(axis=1) < STRAIGHT) & (legs[:, 1] > 0.95 * np.linalg.norm(legs, axis=-1))
     return {
         "pelvis": bend.pelvis,
         "spine": bend.spine,
         "neck": bend.neck,
         "knees": bend.knees.ravel(),
         "elbows": bend.elbows.ravel(),
-        "head": 100 * _head(positions, own=own)[_is_upright(positions, bend.knees)],
+        "head": 100 * _head(middles, own=own)[upright],
     }
 
 
@@ -129,27 +130,11 @@ def _middles(positions: Array) -> tuple[Array, Array, Array, Array]:
     return ankles, hips, shoulders, head
 
 
-def _is_upright(positions: Array, knees: Array) -> NDArray[np.bool_]:
-    """(frames,) whether both legs are straight and upright."""
-    ankles, hips, _, _ = _middles(positions)
-    legs = hips - ankles
-    upright = legs[:, 1] > 0.95 * np.linalg.norm(legs, axis=-1)
-    return np.asarray((np.abs(knees).max(axis=1) < STRAIGHT) & upright, dtype=np.bool_)
-
-
-def _head(positions: Array, *, own: bool) -> Array:
-    """(frames,) metres from the ankles up to the head."""
-    middles = _middles(positions)
+def _head(middles: tuple[Array, Array, Array, Array], *, own: bool) -> Array:
+    """(frames,) metres from the ankles up to the head; own: of the uniform person in the same pose."""
     if not own:
         return middles[3][:, 1] - middles[0][:, 1]
     lines = [end - start for start, end in pairwise(middles)]
     directions = [line[:, 1] / np.linalg.norm(line, axis=-1).clip(1e-9) for line in lines]
-    return np.asarray(sum(up * size for up, size in zip(directions, _person_lengths(), strict=True)), dtype=np.float64)
-
-
-def _person_lengths() -> tuple[float, float, float]:
-    """Metres of the uniform person from ankles to hips, to shoulders, to the head."""
-    first, second, third = (
-        float(np.linalg.norm(end - start)) for start, end in pairwise(_middles(SMPL22.rest_positions()[None]))
-    )
-    return first, second, third
+    sizes = [np.linalg.norm(end - start) for start, end in pairwise(_middles(SMPL22.rest_positions()[None]))]
+    return np.asarray(sum(up * size for up, size in zip(directions, sizes, strict=True)), dtype=np.float64)

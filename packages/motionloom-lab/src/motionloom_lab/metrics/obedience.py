@@ -130,10 +130,6 @@ class Check:
         return "related" if any(re.search(loose, text) for text in texts) else "other"
 
 
-def _of_actions(body: Body) -> Measures:
-    return measure(body.unsmoothed, body.fps)
-
-
 def _function(place: str, side: str | None) -> Callable[[Body], Measures]:
     """The function ``MODULE.NAME`` of `lab.metrics.everyday`, for a side of the body where one is named."""
     module, name = place.split(".")
@@ -150,21 +146,18 @@ def _check(name: str, row: Mapping[str, Any], theme: str = "") -> Check:
         row["seconds"],
         tuple(row["paraphrases"]),
         tuple(Bound(*limit) for limit in row["limits"]),
-        tuple(measures) or (_of_actions,),
+        tuple(measures) or (lambda body: measure(body.unsmoothed, body.fps),),
         theme,
         **{key: row[key] for key in ("airborne", "words", "unless", "related") if key in row},
     )
 
 
-def _rows(file: str) -> dict[str, Any]:
-    return read_table("motionloom_lab.suites", file)
-
-
-CHECKS: tuple[Check, ...] = tuple(_check(name, row) for name, row in _rows("basic_checks.toml").items())
+_read = partial(read_table, "motionloom_lab.suites")
+CHECKS: tuple[Check, ...] = tuple(_check(name, row) for name, row in _read("basic_checks.toml").items())
 """The basic checks."""
 THEMES: dict[str, tuple[Check, ...]] = {
     theme: tuple(_check(name, row, theme) for name, row in rows.items())
-    for theme, rows in _rows("everyday_checks.toml").items()
+    for theme, rows in _read("everyday_checks.toml").items()
 }
 """The everyday checks by theme."""
 EVERYDAY: tuple[Check, ...] = tuple(check for checks in THEMES.values() for check in checks)

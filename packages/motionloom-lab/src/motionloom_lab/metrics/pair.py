@@ -5,7 +5,7 @@ y = 0, at 20 frames per second unless ``fps`` says otherwise. Angles are radians
 compares groups of duets with real ones.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -175,65 +175,33 @@ def _correlation(first: Array, second: Array) -> float:
     return float((a * b).sum() / size) if size > 1e-9 else 0.0
 
 
-@dataclass(frozen=True)
-class PairStats:
-    """The numbers of one duet."""
+def pair_stats(positions: np.ndarray, fps: float = FPS) -> dict[str, float]:
+    """All numbers of one duet of at least two frames, means over frames and people unless said otherwise.
 
-    distance: float
-    """Metres from pelvis to pelvis on the ground, mean."""
-    distance_range: float
-    """Metres: standard deviation of that distance over the frames."""
-    facing: float
-    """Radians between the headings, mean; pi: opposite."""
-    looking_away: float
-    """Radians each is turned away from the other, mean over both and all frames."""
-    mutual: float
-    """Share of frames in which both have the other in view."""
-    hand_distance: float
-    """Metres between the nearest wrists, mean."""
-    hand_contact: float
-    """Share of frames with wrists nearer than `HOLD`."""
-    touch: float
-    """Share of frames with a wrist nearer than `TOUCH` to the other's body."""
-    penetration: float
-    """Metres of the deepest overlap of the bodies, mean over frames."""
-    synchrony: float
-    """Correlation of the root velocities."""
-    speed_synchrony: float
-    """Correlation of the root speeds."""
-    skate_share: float
-    """`skate.Skate.share`, mean of both people."""
-    skate_speed: float
-    """`skate.Skate.speed`, cm/s, mean of both people."""
-    skate_slide: float
-    """`skate.Skate.slide`, mm per frame, mean of both people."""
-
-
-NAMES: tuple[str, ...] = tuple(field.name for field in fields(PairStats))
-"""The numbers of `PairStats` in order."""
-
-
-def pair_stats(positions: np.ndarray, fps: float = FPS) -> PairStats:
-    """All numbers of one duet of at least two frames."""
+    Metres: ``distance`` from pelvis to pelvis on the ground and ``distance_range``, its standard deviation;
+    ``hand_distance`` between the nearest wrists; ``penetration``, the deepest overlap of the bodies. Radians:
+    ``facing`` between the headings, pi: opposite; ``looking_away`` that each is turned away from the other. Shares of
+    frames: ``mutual``, both have the other in view; ``hand_contact``, wrists nearer than `HOLD`; ``touch``, a wrist
+    nearer than `TOUCH` to the other's body. Correlations: ``synchrony`` of the root velocities, ``speed_synchrony`` of
+    their speeds. ``skate_share``, ``skate_speed`` (cm/s) and ``skate_slide`` (mm per frame): see `skate.Skate`.
+    """
     p = _pair(positions)
     apart, hands = distance(p), hand_distance(p)
     feet = [skate(person, fps) for person in p]
-    return PairStats(
-        distance=float(apart.mean()),
-        distance_range=float(apart.std()),
-        facing=float(facing_angle(p).mean()),
-        looking_away=float(looking_away(p).mean()),
-        mutual=mutual(p),
-        hand_distance=float(hands.mean()),
-        hand_contact=float((hands < HOLD).mean()),
-        touch=touch(p),
-        penetration=penetration(p),
-        synchrony=synchrony(p, fps),
-        speed_synchrony=speed_synchrony(p, fps),
-        skate_share=float(np.mean([foot.share for foot in feet])),
-        skate_speed=float(np.mean([foot.speed for foot in feet])),
-        skate_slide=float(np.mean([foot.slide for foot in feet])),
-    )
+    return {
+        "distance": float(apart.mean()),
+        "distance_range": float(apart.std()),
+        "facing": float(facing_angle(p).mean()),
+        "looking_away": float(looking_away(p).mean()),
+        "mutual": mutual(p),
+        "hand_distance": float(hands.mean()),
+        "hand_contact": float((hands < HOLD).mean()),
+        "touch": touch(p),
+        "penetration": penetration(p),
+        "synchrony": synchrony(p, fps),
+        "speed_synchrony": speed_synchrony(p, fps),
+        **{f"skate_{name}": float(np.mean([getattr(f, name) for f in feet])) for name in ("share", "speed", "slide")},
+    }
 
 
 # Parts ---------------------------------------------------------------------------------------------------------------

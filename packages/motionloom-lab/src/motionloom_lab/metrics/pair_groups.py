@@ -131,14 +131,11 @@ def shuffled(pairs: Sequence[np.ndarray], *, shift: int = 1, placed: bool = True
 def _stranger(pair: np.ndarray, stranger: np.ndarray, *, placed: bool) -> Array:
     frames = min(pair.shape[1], len(stranger))
     first, partner, other = pair[0, :frames], pair[1, :frames], stranger[:frames]
-    return np.stack([first, _begin_like(other, partner) if placed else other])
-
-
-def _begin_like(moved: np.ndarray, model: np.ndarray) -> Array:
-    """(frames, 22, 3) moved rigidly on the ground to begin where ``model`` does and to face as it does."""
-    ground = np.array([1.0, 0.0, 1.0])
-    turn = float(ph.heading(moved[:1])[0] - ph.heading(model[:1])[0])
-    return ph.turned(moved - moved[0, 0] * ground, turn) + model[0, 0] * ground
+    if placed:
+        ground = np.array([1.0, 0.0, 1.0])
+        turn = float(ph.heading(other[:1])[0] - ph.heading(partner[:1])[0])
+        other = ph.turned(other - other[0, 0] * ground, turn) + partner[0, 0] * ground
+    return np.stack([first, other])
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ Sources: Yuan and Kitani, DLow, ECCV 2020 (APD to MMFDE); Barquero et al., BeLFu
 Tian et al., TransFusion, 2024 (median and worst ADE). Limbs, jerk and seams: `motionloom_lab.metrics.prediction_body`.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -53,37 +52,6 @@ def apd(samples: np.ndarray) -> float:
 def ade(samples: np.ndarray, truth: np.ndarray) -> float:
     """ADE, metres: mean over frames of the distance from the truth, of the sample where it is least."""
     return float(_errors(*as_window(samples, truth)).mean(axis=1).min())
-
-
-def fde(samples: np.ndarray, truth: np.ndarray) -> float:
-    """FDE, metres: distance from the truth in the last frame, of the sample where it is least."""
-    return float(_errors(*as_window(samples, truth))[:, -1].min())
-
-
-def ade_median(samples: np.ndarray, truth: np.ndarray) -> float:
-    """ADE-M, metres: as `ade`, of the median sample."""
-    return float(np.median(_errors(*as_window(samples, truth)).mean(axis=1)))
-
-
-def ade_worst(samples: np.ndarray, truth: np.ndarray) -> float:
-    """ADE-W, metres: as `ade`, of the worst sample."""
-    return float(_errors(*as_window(samples, truth)).mean(axis=1).max())
-
-
-def mmade(samples: np.ndarray, futures: np.ndarray) -> float:
-    """MMADE, metres: `ade` against each of ``futures`` (K, F, J, 3), the truth among them; mean over them."""
-    return _multimodal(*as_window(samples, futures))[0]
-
-
-def mmfde(samples: np.ndarray, futures: np.ndarray) -> float:
-    """MMFDE, metres: `fde` against each of ``futures`` (K, F, J, 3), the truth among them; mean over them."""
-    return _multimodal(*as_window(samples, futures))[1]
-
-
-def apde(samples: np.ndarray, futures: np.ndarray) -> float | None:
-    """APDE, metres: how far the variety of the samples is from that of the futures; None for a single future."""
-    s, y = as_window(samples, futures)
-    return abs(apd(s) - apd(y)) if len(y) > 1 else None
 
 
 def _errors(samples: Array, truth: Array) -> Array:
@@ -162,33 +130,26 @@ class CmdTally:
         self._sums[name] = self._sums.get(name, 0.0) + np.asarray(values, dtype=np.float64)
         self._counts[name] = self._counts.get(name, 0) + 1
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Windows by class."""
-        return dict(self._counts)
-
     def speeds(self) -> dict[str, float]:
         """Metres per frame by class, mean over windows and frames; of real futures: references of a new data set."""
         return {name: float(total.mean() / self._counts[name]) for name, total in self._sums.items()}
 
-    def by_class(self, reference: Mapping[str, float] | float) -> dict[str, float]:
-        """CMD of each class: sum over steps t = 1 .. F-1 of (F - t) |mean speed at t - reference|."""
-        missing = [] if isinstance(reference, (int, float)) else [n for n in self._sums if n not in reference]
-        if missing:
-            raise MotionloomError(f"there is no reference speed for the classes {', '.join(sorted(missing)[:5])}.")
-        result = {}
-        for name, total in self._sums.items():
-            wanted = reference if isinstance(reference, (int, float)) else reference[name]
-            weights = np.arange(len(total), 0, -1)
-            result[name] = float((weights * np.abs(total / self._counts[name] - wanted)).sum())
-        return result
-
     def result(self, reference: Mapping[str, float] | float) -> float:
-        """CMD: mean over the windows of that of their class; ``reference`` metres per frame, by class or for all."""
-        found, windows = self.by_class(reference), sum(self._counts.values())
-        if windows == 0:
+        """CMD: mean over the windows of that of their class; ``reference`` metres per frame, by class or for all.
+
+        That of a class: sum over steps t = 1 .. F-1 of (F - t) |mean speed at t - reference|.
+        """
+        if not isinstance(reference, Mapping):
+            reference = dict.fromkeys(self._sums, reference)
+        if missing := sorted(self._sums.keys() - reference.keys()):
+            raise MotionloomError(f"there is no reference speed for the classes {', '.join(missing[:5])}.")
+        if not self._sums:
             raise MotionloomError("CMD was asked of no windows at all.")
-        return sum(found[name] * count for name, count in self._counts.items()) / windows
+        total = 0.0
+        for name, speed in self._sums.items():
+            count, weights = self._counts[name], np.arange(len(speed), 0, -1)
+            total += count * float((weights * np.abs(speed / count - reference[name])).sum())
+        return total / sum(self._counts.values())
 
 
 # ---- what needs no model
@@ -221,38 +182,26 @@ METRICS = (
     *("stretch", "stretch_rmse", "jitter", "jitter_rmse", "mae", "jerk", "jerk_peak"),
     *("seam_velocity", "seam_velocity_worst", "seam_acceleration", "seam_acceleration_worst"),
 )
-"""Numbers of `WindowScores` in the order of tables; CMD is apart, for it is not a mean of windows (`Tally.cmd`)."""
+"""Numbers of a window in the order of tables; CMD is apart, for it is not a mean of windows (`Tally.cmd`).
+
+Metres: ``apd`` as `apd`; ``ade`` as `ade`, and ``ade_median`` and ``ade_worst`` the same of the median and the worst
+sample; ``fde`` the distance from the truth in the last frame, of the sample where it is least; ``mmade`` and ``mmfde``
+ADE and FDE against each of the futures, mean over them; ``apde`` how far the variety of the samples is from that of the
+futures. The others: `prediction_body`.
+"""
 MULTIMODAL = ("mmade", "mmfde", "apde")
 """Metrics that ``skip_multimodal`` leaves out for windows with a single future."""
 
 
-@dataclass(frozen=True, eq=False)
-class WindowScores:
-    """Everything measured of one window; None where it cannot be measured (see `score_window`)."""
+class WindowScores(NamedTuple):
+    """Everything measured of one window."""
 
     futures: int
     """How many real futures the window has, the truth counted."""
     speeds: Array
     """(F - 1,) metres per frame, what CMD is made of."""
-    apd: float
-    ade: float
-    fde: float
-    mmade: float
-    mmfde: float
-    apde: float | None
-    ade_median: float
-    ade_worst: float
-    jerk: float
-    jerk_peak: float
-    stretch: float | None = None
-    stretch_rmse: float | None = None
-    jitter: float | None = None
-    jitter_rmse: float | None = None
-    mae: float | None = None
-    seam_velocity: float | None = None
-    seam_velocity_worst: float | None = None
-    seam_acceleration: float | None = None
-    seam_acceleration_worst: float | None = None
+    numbers: dict[str, float]
+    """By the name of `METRICS`; what cannot be measured (see `score_window`) is absent."""
 
 
 def score_window(
@@ -268,34 +217,31 @@ def score_window(
 
     ``samples`` (S, F, J, 3), ``truth`` (F, J, 3), ``futures`` (K, F, J, 3) with the truth among them (None: only the
     truth), metres, F >= 4, at ``fps`` frames per second. ``past`` (>= 3 frames, J, 3) for the seam; ``limbs`` for the
-    body. Without them the seam and the body are None, as is APDE of a single future.
+    body. Without them the seam and the body are absent, as is APDE of a single future.
     """
     s, t = as_window(samples, truth, frames=4)
     y = t[None] if futures is None else as_window(samples, as_poses(futures, 4, "futures"))[1]
-    errors = _errors(s, t)
-    mean = errors.mean(axis=1)
-    mm, jolt = _multimodal(s, y), jerk(s, fps)
-    measured: dict[str, float] = {}
+    errors, variety, jolt = _errors(s, t), apd(s), jerk(s, fps)
+    mean, (mmade, mmfde) = errors.mean(axis=1), _multimodal(s, y)
+    numbers = {
+        "apd": variety,
+        "ade": float(mean.min()),
+        "fde": float(errors[:, -1].min()),
+        "mmade": mmade,
+        "mmfde": mmfde,
+        "ade_median": float(np.median(mean)),
+        "ade_worst": float(mean.max()),
+        "jerk": jolt.mean,
+        "jerk_peak": jolt.peak,
+    }
+    if len(y) > 1:
+        numbers["apde"] = abs(variety - apd(y))
     if limbs is not None:
-        measured |= stretch(s, t, limbs)._asdict()
-        measured |= {"mae": angle_error(s, t, limbs)} if limbs.chains else {}
+        numbers |= stretch(s, t, limbs)._asdict()
+        numbers |= {"mae": angle_error(s, t, limbs)} if limbs.chains else {}
     if past is not None:
-        measured |= {f"seam_{name}": value for name, value in seam(past, s, fps)._asdict().items()}
-    variety = apd(s)
-    return WindowScores(
-        len(y),
-        speeds(s),
-        variety,
-        float(mean.min()),
-        float(errors[:, -1].min()),
-        *mm,
-        abs(variety - apd(y)) if len(y) > 1 else None,
-        float(np.median(mean)),
-        float(mean.max()),
-        jolt.mean,
-        jolt.peak,
-        **measured,
-    )
+        numbers |= {f"seam_{name}": value for name, value in seam(past, s, fps)._asdict().items()}
+    return WindowScores(len(y), speeds(s), numbers)
 
 
 class Average(NamedTuple):
@@ -313,10 +259,6 @@ class Tally:
         if singles not in get_args(Singles):
             raise MotionloomError(f"singles is one of {', '.join(get_args(Singles))}, not {singles!r}.")
         self.singles: Singles = singles
-        self.windows = 0
-        """Windows offered."""
-        self.single = 0
-        """Of those, windows of a single future."""
         self.cmd = CmdTally()
         self._sums: dict[str, float] = {}
         self._counts: dict[str, int] = {}
@@ -324,13 +266,11 @@ class Tally:
     def add(self, scores: WindowScores, name: str = "all") -> None:
         """Count a window of class ``name`` (for CMD)."""
         alone = scores.futures == 1
-        self.windows += 1
-        self.single += alone
         if alone and self.singles == "skip":
             return
         self.cmd.add_speeds(name, scores.speeds)
         for metric in METRICS:
-            value: float | None = getattr(scores, metric)
+            value = scores.numbers.get(metric)
             if value is None or (alone and self.singles == "skip_multimodal" and metric in MULTIMODAL):
                 continue
             self._sums[metric] = self._sums.get(metric, 0.0) + value
@@ -339,11 +279,3 @@ class Tally:
     def averages(self) -> dict[str, Average]:
         """By name of `METRICS`, in that order; metrics that were measured on no window are absent."""
         return {m: Average(self._sums[m] / self._counts[m], self._counts[m]) for m in METRICS if m in self._counts}
-
-
-def averages(scores: Iterable[WindowScores], singles: Singles = "all") -> dict[str, Average]:
-    """`Tally.averages` of all the windows."""
-    tally = Tally(singles)
-    for one in scores:
-        tally.add(one)
-    return tally.averages()

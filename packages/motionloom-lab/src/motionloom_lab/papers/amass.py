@@ -7,7 +7,7 @@ import csv
 import io
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +21,9 @@ from motionloom.io.atomic import finished
 from motionloom.io.text import plain_json
 from motionloom_lab.papers import babel
 from motionloom_lab.papers.benchmark_layouts import TABLES
+from motionloom_train.data.paths import DAMAGED
 from motionloom_train.data.prediction import Protocol, Recording, checked
+from motionloom_train.data.progress import Say, silent
 
 AMASS_LAYOUT = replace(SMPL_LAYOUT, across=(), root=False, z_up=True)
 """21 joints from the root, +Z up, no way through the world."""
@@ -53,7 +55,7 @@ def read_amass(
     *,
     splits: tuple[str, ...] = ("train", "val", "test"),
     segments: Path | str | None = None,
-    say: Callable[[str], None] = lambda line: None,
+    say: Say = silent,
 ) -> Protocol:
     """AMASS: 21 joints at 60 Hz, 30 frames observed and 120 predicted; whole data sets for each split; class: data set.
 
@@ -76,9 +78,10 @@ def read_amass(
     folder = Path(folder)
     sets = [(name, place) for name, place in _set_folders(folder) if _SPLITS[name] in splits]
     if not sets:
+        zarr = next(folder.glob("*/poses.zarr"), None) is not None
         raise MotionloomError(
             f"{folder} has no folder of {', '.join(splits)} called after a data set of AMASS, such as CMU or DanceDB"
-            f"{_zarr(folder)}"
+            f"{'; .zarr folders are not read, save their arrays as .npy' if zarr else ''}"
         )
     recordings: list[Recording] = []
     uniform = False
@@ -118,15 +121,10 @@ def _set_folders(folder: Path) -> list[tuple[str, Path]]:
     return list({name: (name, place) for name, place in reversed(found)}.values())[::-1]
 
 
-def _zarr(folder: Path) -> str:
-    there = next(folder.glob("*/poses.zarr"), None) is not None
-    return "; .zarr folders are not read, save their arrays as .npy" if there else ""
-
-
 # Recordings
 
 
-def _recordings(name: str, place: Path, say: Callable[[str], None]) -> Iterator[tuple[Recording, bool]]:
+def _recordings(name: str, place: Path, say: Say) -> Iterator[tuple[Recording, bool]]:
     files: dict[str, Path] = {}
     for path in sorted(finished(place, "**/*.np[yz]"), key=lambda p: (p.suffix == ".npy", p)):  # .npy last: it wins
         if not path.stem.endswith("_stagei") and path.stem != "shape":  # files of persons, not of motions
@@ -187,7 +185,7 @@ def _step(fps: float) -> int:
 # Lists of test windows
 
 
-def _listed(path: Path, recordings: Sequence[Recording], say: Callable[[str], None]) -> tuple[tuple[str, int], ...]:
+def _listed(path: Path, recordings: Sequence[Recording], say: Say) -> tuple[tuple[str, int], ...]:
     """The windows of a list that there are, by recording and first frame."""
     by_key: dict[str, list[Recording]] = {}
     for r in recordings:
@@ -216,7 +214,7 @@ def _rows(path: Path) -> list[tuple[str, int]]:
         rows = [(str(file), int(first)) for file, first in pairs]
         if not rows or any(first < 0 for _, first in rows):
             raise ValueError("it has no windows, or one that begins before its recording")
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError, csv.Error) as error:
+    except DAMAGED as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(
             f"{path} is no list of test windows ({type(error).__name__}: {reason}); it needs dataset, file and "

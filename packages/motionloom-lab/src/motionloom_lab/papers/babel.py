@@ -11,7 +11,7 @@ Pairs are made as for PriorMDM's BABEL models ("separate pairs"): see `pairs` an
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from pathlib import Path
@@ -26,7 +26,8 @@ from motionloom.features.babel import FPS, Y_UP, encode
 from motionloom.io import npz, text
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom_train.data.paths import inside
+from motionloom_train.data.paths import DAMAGED, inside
+from motionloom_train.data.progress import Say
 from motionloom_train.data.words import check_caption
 
 SHORTEST, LONGEST = 45, 250
@@ -145,7 +146,7 @@ def read_labels(path: Path, split: str) -> list[Recording]:
     for number, entry in whole.items():
         try:
             result.append(_recording(str(number), split, entry))
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        except DAMAGED as error:
             reason = " ".join(str(error).split())[:120]
             raise MotionloomError(
                 f"{path}: sequence {text.shown(str(number))} is not as BABEL writes it "
@@ -345,7 +346,7 @@ def load_items(
     longest: int = LONGEST,
     crop: bool = False,
     seed: int = 0,
-    dropped: Callable[[str], None] | None = None,
+    dropped: Say | None = None,
 ) -> list[BabelItem]:
     """All examples of one split of a BABEL folder. ``crop``: cut longer ones at random, by ``seed`` (see `items`).
 

@@ -8,7 +8,6 @@ No model is to be chosen on the test part: what the published protocols train on
 """
 
 import re
-from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,10 @@ from motionloom.io import text
 from motionloom.io.atomic import finished
 from motionloom_lab.papers.amass import is_amass, read_amass
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT, TABLES
-from motionloom_lab.papers.pickled import Tables, read_tables
+from motionloom_lab.papers.plain_pickle import Tables, read_tables
 from motionloom_lab.papers.readers import find_takes
 from motionloom_train.data.prediction import Protocol, Recording, checked, read_cmu, read_folder
+from motionloom_train.data.progress import Say, silent
 
 SPLITS = ("train", "val", "test")
 NAMES = ("h36m", "humaneva", "amass", "cmu", "own")
@@ -43,9 +43,7 @@ FARTHEST = 100.0
 """Metres from the middle of the room beyond which numbers are no metres."""
 
 
-def read_h36m(
-    path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Callable[[str], None] = lambda line: None
-) -> Protocol:
+def read_h36m(path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Say = silent) -> Protocol:
     """Human3.6M out of ``data_3d_h36m.npz``: 17 of 32 joints at 50 Hz, 25 frames observed and 100 predicted.
 
     Train on S1, S5, S6, S7, S8 less what is held out for validation (`held_out`), test on S9 and S11: windows start at
@@ -76,9 +74,7 @@ def h36m_class(action: str) -> str:
     return _ALIASES.get(name, name)
 
 
-def read_humaneva(
-    path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Callable[[str], None] = lambda line: None
-) -> Protocol:
+def read_humaneva(path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Say = silent) -> Protocol:
     """HumanEva-I out of ``data_3d_humaneva15.npz``: 15 joints at 60 Hz, 15 frames observed and 60 predicted.
 
     Train on Train/S1 to S3 less what is held out (`held_out`), test on Validate/S1 to S3: the same three people, as
@@ -108,7 +104,7 @@ def held_out(actions: int, subject: int) -> set[int]:
     return {(2 * subject + 1 + 10 * k) % actions for k in range(count)}
 
 
-def _subjects(path: Path | str, wanted: tuple[str, ...], called: str, say: Callable[[str], None]) -> Tables:
+def _subjects(path: Path | str, wanted: tuple[str, ...], called: str, say: Say) -> Tables:
     table = read_tables(path, "positions_3d")
     missing = [name for name in wanted if name not in table]
     if len(missing) == len(wanted):
@@ -142,7 +138,7 @@ def find_protocol(
     splits: tuple[str, ...] = SPLITS,
     segments: Path | str | None = None,
     fps: float = 30.0,
-    say: Callable[[str], None] = lambda line: None,
+    say: Say = silent,
 ) -> Protocol:
     """The data set that a file or folder holds, recognised by what is in it; ``name`` (one of `NAMES`) wins.
 
@@ -173,8 +169,13 @@ def _recognised(path: Path, name: str | None) -> tuple[str, Path]:
         )
     if name in ("amass", "cmu", "own"):
         return name, path
-    files = {kind: _npz_files(path, kind) for kind in ("h36m", "humaneva") if name in (None, kind)}
-    found = [(kind, place) for kind, places in files.items() for place in places]
+    found = [
+        (kind, place)
+        for kind in ("h36m", "humaneva")
+        if name in (None, kind)
+        for place in finished(path, f"data_3d_{kind}*.npz")
+        if not place.stem.endswith("_test")
+    ]
     if len(found) > 1:
         listed = " and ".join(place.name for _, place in found[:3])
         raise MotionloomError(f"{path} has {listed}; name the one that is meant")
@@ -189,22 +190,14 @@ def _recognised(path: Path, name: str | None) -> tuple[str, Path]:
     return "cmu" if (any(cmu) if pack else all(cmu)) else "own", path
 
 
-def _npz_files(folder: Path, kind: str) -> list[Path]:
-    return [p for p in finished(folder, f"data_3d_{kind}*.npz") if not p.stem.endswith("_test")]
-
-
 def _file_kind(path: Path) -> str:
     for kind in ("h36m", "humaneva"):
         if kind in path.name.lower():
             return kind
-    return _subject_kind(path, read_tables(path, "positions_3d"))
-
-
-def _subject_kind(path: Path, names: Iterable[str]) -> str:
-    found = set(names)
-    if any(name.startswith(("Train/", "Validate/")) for name in found):
+    subjects = set(read_tables(path, "positions_3d"))
+    if any(name.startswith(("Train/", "Validate/")) for name in subjects):
         return "humaneva"
-    if found & set(H36M_TRAIN + H36M_TEST):
+    if subjects & set(H36M_TRAIN + H36M_TEST):
         return "h36m"
-    listed = ", ".join(text.shown(name, 20) for name in sorted(found)[:8]) or "nobody"
+    listed = ", ".join(text.shown(name, 20) for name in sorted(subjects)[:8]) or "nobody"
     raise MotionloomError(f"{path} has the subjects of neither Human3.6M nor HumanEva-I; it has {listed}")

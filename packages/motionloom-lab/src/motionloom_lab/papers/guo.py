@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import torch
@@ -244,26 +244,18 @@ def load_guo(path: Path | str, *, cap_len: CapLen = "true") -> GuoEvaluator:
         raise MotionloomError(f"there is no evaluator {path}")
     about, tensors = GUO.read(path)
     with GUO.parsing(path):
-        _check_about(about)
+        special = about["special"]
+        if not _texts(about["card"]) or not (special is None or _texts(special)):
+            raise ValueError("values of the wrong kind")
+        if not set((special or {}).values()) <= set(SPECIAL):
+            raise ValueError("an unknown class of words")
     nets = from_state_dict({key[4:]: tensor(value) for key, value in tensors.items() if key.startswith("net.")})
-    mean, std = (_numbers(tensors, key) for key in ("mean", "std"))
-    return GuoEvaluator(nets, mean, std, _words(path, tensors, about["special"]), cap_len, about["card"])
-
-
-def _check_about(about: dict[str, Any]) -> None:
-    special = about["special"]
-    if not _texts(about["card"]) or not (special is None or _texts(special)):
-        raise ValueError("values of the wrong kind")
-    if not set((special or {}).values()) <= set(SPECIAL):
-        raise ValueError("an unknown class of words")
+    mean, std = (tensors[key].astype(np.float64) if key in tensors else None for key in ("mean", "std"))
+    return GuoEvaluator(nets, mean, std, _words(path, tensors, special), cap_len, about["card"])
 
 
 def _texts(values: object) -> bool:
     return isinstance(values, dict) and all(isinstance(v, str) for v in [*values, *values.values()])
-
-
-def _numbers(tensors: Mapping[str, np.ndarray], key: str) -> np.ndarray | None:
-    return tensors[key].astype(np.float64) if key in tensors else None
 
 
 def _words(path: Path, tensors: Mapping[str, np.ndarray], special: dict[str, str] | None) -> Words | None:

@@ -20,6 +20,7 @@ from motionloom.io import npz
 from motionloom.io.text import plain_json
 from motionloom.reading import read_bytes
 from motionloom_lab.papers.plain_pickle import read_plain_file
+from motionloom_train.data.paths import DAMAGED
 
 TAGS = (
     "VERB",
@@ -159,7 +160,7 @@ def read_special(path: Path | str) -> dict[str, str]:
             for word in words:
                 found.setdefault(word, name)
         return found
-    except (OSError, ValueError, SyntaxError, RecursionError, MemoryError, TypeError) as error:
+    except (*DAMAGED, SyntaxError, MemoryError) as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{path} gives no lists of special words ({reason}); name word_vectorizer.py") from None
 

@@ -4,6 +4,8 @@ Of the unpickler's operations those are left that push a value, remember it, or 
 ``find_class`` knows the few names that numpy's own pickles hold, and answers with methods of this class, which make
 arrays from bytes whose length they check. Any other name and any other operation ends the reading. Python 2's pickles
 (protocols 0 to 2) are read with latin-1 strings, as ``pickle.load(file, encoding="latin1")`` would.
+
+The usual files of Human3.6M and HumanEva-I are .npz files that keep one such pickle: see `read_tables`.
 """
 
 import io
@@ -16,11 +18,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.io import text
+from motionloom.io.npz import opened, read_header
 from motionloom.reading import read_bytes
 
 MAX_OPERATIONS = 1 << 18
@@ -372,3 +376,49 @@ def _fill_table(table: Any, items: list[Any]) -> None:
     if not all(isinstance(key, str | bytes | int | float | None) for key in items[::2]):
         raise ValueError("a key of its table is no plain value")
     table.update(zip(items[::2], items[1::2], strict=True))
+
+
+MAX_ARRAYS = 20_000
+Tables = dict[str, dict[str, np.ndarray]]
+
+
+def read_tables(path: Path | str, name: str) -> Tables:
+    """The dictionary of dictionaries of number arrays that an .npz file keeps under ``name``.
+
+    Raises MotionloomError, naming the file, for a file that is missing, damaged, too large or holds anything else.
+    """
+    with opened(path) as (archive, members, most):
+        if name not in members:
+            listed = ", ".join(text.shown(n) for n in list(members)[:8]) or "nothing"
+            raise MotionloomError(f"{path} is not read (it has no {name}, but {listed}); fetch it again")
+        with archive.open(members[name]) as stream:
+            shape, _, dtype = read_header(cast(BinaryIO, stream))
+            if dtype.kind != "O" or shape != ():
+                raise MotionloomError(
+                    f"{path} is not read ({name} is an array of {dtype} of the shape {shape} and no dictionary); "
+                    "fetch it again"
+                )
+            if members[name].file_size > 8 * most:
+                raise MotionloomError(f"{path} is not read (it unfolds far beyond its size); fetch it again")
+            data = stream.read(members[name].file_size)
+    value = read_plain(data, limit=text.MAX_BYTES, name=str(path))
+    try:
+        return _tables(value)
+    except ValueError as error:
+        raise MotionloomError(f"{path} is not read ({error}); fetch it again") from None
+
+
+def _tables(value: object) -> Tables:
+    """What the pickle held, if it is a dictionary, by names, of dictionaries of arrays of numbers."""
+    if isinstance(value, np.ndarray) and value.dtype == object and value.shape == ():
+        value = value.item()
+    if not isinstance(value, dict) or not all(isinstance(inner, dict) for inner in value.values()):
+        raise ValueError("it holds no dictionary of dictionaries")
+    if not all(isinstance(key, str) for table in (value, *value.values()) for key in table):
+        raise ValueError("its dictionaries have keys that are not text")
+    arrays = [array for inner in value.values() for array in inner.values()]
+    if not all(isinstance(array, np.ndarray) and array.dtype.kind in "fiu" for array in arrays):
+        raise ValueError("its dictionaries hold something else than arrays of numbers")
+    if len(arrays) > MAX_ARRAYS or sum(array.nbytes for array in arrays) > text.MAX_BYTES:
+        raise ValueError(f"it holds more than {MAX_ARRAYS} arrays or 2 GB of numbers")
+    return value

@@ -6,6 +6,7 @@ from pathlib import Path
 from motionloom_lab.papers import babel, threedpw
 from motionloom_train.data import pairs, sources
 from motionloom_train.data.pairs import Pair
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.sources import Places, Span, Take, places_of
 
 BABEL_LICENCE = "BABEL / AMASS: non-commercial research under the licences of BABEL, AMASS and its subsets"
@@ -20,9 +21,7 @@ def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> lis
     return sources.find_takes(folder, captions=captions)
 
 
-def find_pairs(
-    folder: Path | str, *, captions: bool = True, say: Callable[[str], None] = lambda line: None
-) -> list[Pair]:
+def find_pairs(folder: Path | str, *, captions: bool = True, say: Say = silent) -> list[Pair]:
     """As `data.pairs.find_pairs`, and the pairs of a 3DPW folder."""
     folder = Path(folder)
     if folder.is_dir() and not (folder / "manifest.csv").is_file() and threedpw.is_3dpw(folder):

@@ -13,7 +13,7 @@ data of ComMDM (Shafir et al., 2023) was made from these files by code that is n
   the ground (`data.pairs`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from motionloom.kinematics.physics import ANKLES, TOES, Array, J, smooth, veloci
 from motionloom.retarget.floor import level
 from motionloom_lab.papers.plain_pickle import read_plain_file
 from motionloom_train.data.pairs import Pair
+from motionloom_train.data.progress import Say, silent
 
 LICENCE = (
     "3DPW: non-commercial scientific research only, under the licence of its owners (virtualhumans.mpi-inf.mpg.de)"
@@ -49,7 +50,7 @@ def read_3dpw(
     *,
     texts: Path | str | None = None,
     splits: Sequence[str] = ("train", "validation"),
-    say: Callable[[str], None] = lambda line: None,
+    say: Say = silent,
 ) -> list[Pair]:
     """The sequences with two people.
 

@@ -17,6 +17,7 @@ from motionloom.reading import read_bytes
 from motionloom_lab.report.files import check_report, write_json, write_text
 from motionloom_lab.report.files import markdown as table
 from motionloom_lab.report.files import plain as columns_of_text
+from motionloom_train.data.paths import DAMAGED
 
 Better = Literal["up", "down", "real", ""]
 REAL = "real"
@@ -127,7 +128,7 @@ def read(path: Path | str) -> Report:
         raise MotionloomError(f"{error}; name a report.json or its folder") from None
     try:
         return decode(plain_json(text, finite=True))
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except DAMAGED as error:
         said = error if isinstance(error, MotionloomError) else repr(error)
         raise MotionloomError(f"{path} is not a report of motionloom evaluate ({said}); measure again") from None
 
@@ -228,24 +229,22 @@ def _cells(report: Report, rows: Sequence[Row], *, bold: bool = False) -> list[l
     shown = [c for c in report.columns if any(c.name in row.values for row in rows)]
     if len(rows) == 1 and len(shown) > WIDE:
         return _turned(rows[0], shown)
-    table = [["", *(_line(c.title) + ARROWS[c.better] for c in shown)]]
-    table += [[_line(row.name), *(_cell(report, row, c, bold=bold) for c in shown)] for row in rows]
-    counts = [_repeats(row, shown) for row in rows]
+    best = {c.name: _best(report, c) for c in shown} if bold else {}
+    table, counts = [["", *(_line(c.title) + ARROWS[c.better] for c in shown)]], []
+    for row in rows:
+        cells = {c.name: cell(c, row.values[c.name]) if c.name in row.values else "" for c in shown}
+        table.append(
+            [
+                _line(row.name),
+                *(f"**{text}**" if text and best.get(k) == row.name else text for k, text in cells.items()),
+            ]
+        )
+        # a share shows its own count
+        counts.append([row.values[c.name].count for c in shown if c.name in row.values and not c.share])
     if max((count for row in counts for count in row), default=0) <= 1:
         return table
     last = ["count", *(_counts(row) for row in counts)]
     return [[*line, count] for line, count in zip(table, last)]
-
-
-def _cell(report: Report, row: Row, column: Column, *, bold: bool) -> str:
-    text = cell(column, row.values[column.name]) if column.name in row.values else ""
-    return f"**{text}**" if text and bold and _best(report, column) == row.name else text
-
-
-def _repeats(row: Row, shown: Sequence[Column]) -> list[int]:
-    """How often each number of a row was measured; a share shows its own count."""
-    counted = {c.name for c in shown if not c.share}
-    return [value.count for name, value in row.values.items() if name in counted]
 
 
 def _turned(row: Row, shown: Sequence[Column]) -> list[list[str]]:

@@ -4,7 +4,7 @@
 `motionloom evaluate reach` makes it anew.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from motionloom.kinematics.wholeness import whole_frames
 from motionloom.reading import read_table
 from motionloom_lab.metrics import bodies
 from motionloom_lab.papers.readers import find_takes
+from motionloom_train.data.progress import Say, silent
 
 MOST = 200
 """Recordings of each folder: enough for percentiles."""
@@ -26,7 +27,7 @@ def known() -> bodies.Reach:
     return {name: tuple(values) for name, values in read_table("motionloom_lab.suites", "bodies.json")["reach"].items()}
 
 
-def reach_of(folders: Sequence[Path | str], *, say: Callable[[str], None] = lambda line: None) -> bodies.Reach:
+def reach_of(folders: Sequence[Path | str], *, say: Say = silent) -> bodies.Reach:
     """Percentiles of the people recorded in folders, on their own skeletons; what is animated by hand is left out.
 
     Of each folder `MOST` recordings are read, spread evenly over it.
@@ -35,7 +36,7 @@ def reach_of(folders: Sequence[Path | str], *, say: Callable[[str], None] = lamb
     return bodies.reach_of(_recordings(folders, say))
 
 
-def _recordings(folders: Sequence[Path | str], say: Callable[[str], None]) -> Iterator[Array]:
+def _recordings(folders: Sequence[Path | str], say: Say) -> Iterator[Array]:
     count = 0
     for folder in folders:
         captured = [take for take in find_takes(folder) if take.kind == "capture"]

@@ -23,7 +23,7 @@ PROMPT = "a person walks forward and waves"
 def tools_of(asked: Asked) -> registry.Tools:
     """Motions and speeds of the weights, which are loaded once, when a suite first asks."""
     from motionloom_lab.bench import Sampling, bench
-    from motionloom_lab.suites.generator import generator
+    from motionloom_lab.suites.harness import generator
 
     @cache
     def prior() -> Prior:
@@ -55,7 +55,7 @@ def job_of(asked: Asked, command: str = "", folder: Path | None = None) -> regis
     if folder:
         files.check_report(folder / "report.json")
     if asked.get("threads") is not None:
-        from motionloom_train.threads import set_threads
+        from motionloom_train.tensors import set_threads
 
         if not 1 <= asked["threads"] <= 1024:
             raise MotionloomError(f"the number of threads must be from 1 to 1024; got {asked['threads']}")
@@ -216,7 +216,7 @@ def compare(asked: Asked) -> int:
 
 def generator_of(asked: Asked) -> Generate:
     """The prior behind a plain function of prompts, length and seed."""
-    from motionloom_lab.suites.generator import generator
+    from motionloom_lab.suites.harness import generator
 
     names = ("steps", "guidance", "solver", "finished", "best_of")
     prior = Prior.load(asked["weights"], device=asked["device"])
@@ -245,7 +245,7 @@ def obedience(asked: Asked) -> None:
     """Everyday prompts, each with a physical check, on several seeds."""
     from motionloom.viz.film import suffixed
     from motionloom_lab.metrics.obedience import chosen, in_words
-    from motionloom_lab.suites import everyday, obey
+    from motionloom_lab.suites import obey
     from motionloom_lab.suites.reference import known
 
     checks = chosen(asked["prompts"], asked.get("only"))
@@ -255,7 +255,7 @@ def obedience(asked: Asked) -> None:
     # 0 for the twenty of old, and 100 where seeds should be ones that nothing was chosen by
     seed = asked.get("seed", 0 if asked["prompts"] == "basic" else 100)
     settings = sampling_of(asked) | ({"best_of": asked["best_of"]} if asked["best_of"] > 1 else {})
-    generate = everyday.FirstDraws(generator_of(asked))
+    generate = obey.FirstDraws(generator_of(asked))
     results = obey.run(
         run_of(asked),
         checks,
@@ -266,7 +266,7 @@ def obedience(asked: Asked) -> None:
         settings=settings,
     )
     rows = obey.table(results, checks, real=known()["checks"] if asked["prompts"] != "everyday" else None)
-    themes, said = everyday.themes(results), obey.in_a_sentence(obey.totals(results, checks))
+    themes, said = obey.themes(results), obey.in_a_sentence(obey.totals(results, checks))
     more = [themes] if len(themes) > 1 else []
     if asked.get("out"):
         write_page(asked, "report", "Obedience", said, [*more, rows])
@@ -322,7 +322,7 @@ def reach(asked: Asked) -> None:
 def reference(asked: Asked) -> None:
     """Real clips by the basic checks."""
     from motionloom_lab.suites import reference
-    from motionloom_lab.suites.clips import real_clips
+    from motionloom_lab.suites.items import real_clips
 
     out = files.check_report(asked["out"]) if asked.get("out") else None
     found = reference.reference(real_clips(asked["data"]), progress=say)
@@ -337,8 +337,8 @@ def checks(asked: Asked) -> None:
     """The everyday checks on real people who do what is asked, and on real people who don't."""
     from motionloom_lab.metrics.obedience import chosen
     from motionloom_lab.suites import trial
-    from motionloom_lab.suites.clips import real_clips
-    from motionloom_lab.suites.trial_clips import trials
+    from motionloom_lab.suites.items import real_clips
+    from motionloom_lab.suites.trial import trials
 
     wanted = [check for check in chosen("everyday", asked.get("only")) if check.theme]
     if not wanted:

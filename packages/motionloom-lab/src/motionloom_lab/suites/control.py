@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,17 +23,14 @@ from motionloom.weights.adapter import adapters
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics import control as metrics
 from motionloom_lab.metrics.control import ControlError
-from motionloom_lab.metrics.frechet import fid, fid_bias
-from motionloom_lab.metrics.retrieval import r_precision
-from motionloom_lab.report import published_rows
+from motionloom_lab.metrics.retrieval import fid, fid_bias, r_precision
 from motionloom_lab.report.report import REAL, Report
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import control_kinds, text_reference
 from motionloom_lab.suites.control_kinds import Kind, Target
 from motionloom_lab.suites.control_methods import BASE, METHODS, Made, Maker, checked, fits, maker
-from motionloom_lab.suites.harness import Run, check_names, digest, diversity, physical_mean, row_of
+from motionloom_lab.suites.harness import Parts, Run, check_names, digest, diversity, physical_mean, replicated, row_of
 from motionloom_lab.suites.items import Item, fitting, pick, read_items, spread
-from motionloom_lab.suites.parts import Parts
 from motionloom_lab.suites.protocol import Protocol, Selection
 
 COUNT, REPLICATIONS = 32, 3
@@ -213,11 +210,18 @@ def measure(
     for one in kinds:
         found: dict[str, list[dict[str, float]]] = {}
         for name in [name for name in METHODS if name in wanted and fits(one, name)]:
-            done = [parts.find(f"{one.name} {name} {r}") for r in count]  # those of another run are refused
+            row = f"{one.name} {name}"
+            for r in count:
+                parts.find(f"{row} {r}")  # those of another run are refused
             try:
-                found[name] = [
-                    numbers or _new(trial, parts, one, name, r, progress=run.progress) for r, numbers in enumerate(done)
-                ]
+                found[name] = replicated(
+                    row,
+                    len(count),
+                    lambda r, one=one, name=name: of_method(trial, one, name, r),
+                    parts,
+                    _in_words,
+                    run.progress,
+                )
             except MotionloomError as error:
                 missing.append(f"{one.title}, {name}: not measured ({error})")
                 run.progress(missing[-1])
@@ -234,22 +238,13 @@ def measure(
         "goals": [one.name for one in kinds],
         "fid": f"of {len(trial.items)} motions to all {len(trial.everyone)} real ones",
     }
-    others = published_rows.published("control", [column.name for column in COLUMNS])
-    said, title = (*_notes(trial), *missing), f"Control: {run.label}"
-    return Report("control", title, run.command, described, COLUMNS, (*rows, *others), said)
+    said = (*_notes(trial), *missing)
+    return run.report("control", f"Control: {run.label}", described, rows, said, beside="control")
 
 
-def _new(
-    trial: ControlTrial, parts: Parts, one: Kind, name: str, replication: int, *, progress: Callable[[str], None]
-) -> dict[str, float]:
-    found = of_method(trial, one, name, replication)
-    parts.keep(f"{one.name} {name} {replication}", found)
-    said = ", ".join(f"{k} {found[k]:.2f} cm" for k in ("root_error", "joint_error") if k in found)
-    progress(
-        f"{one.title}, {name}, {replication + 1} of {trial.protocol.replications}: {said}, "
-        f"{found['seconds']:.2f} s per motion"
-    )
-    return found
+def _in_words(numbers: Mapping[str, float]) -> str:
+    errors = [f"{k} {numbers[k]:.2f} cm" for k in ("root_error", "joint_error") if k in numbers]
+    return ", ".join([*errors, f"{numbers['seconds']:.2f} s per motion"])
 
 
 def against(numbers: Sequence[dict[str, float]], base: Sequence[dict[str, float]] | None) -> list[dict[str, float]]:

@@ -15,23 +15,57 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.kinematics.physics import Array, foot_skate
-from motionloom.tasks.text import STEPS
 from motionloom.weights.pair import PairBlock, blocks
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.papers.mrt import MrtFile
-from motionloom_lab.report.published_rows import published
 from motionloom_lab.report.report import REAL, Report, Row, Value
 from motionloom_lab.report.tables import columns, notes
-from motionloom_lab.suites import duet_blocks
 from motionloom_lab.suites import duet_ways as ways
-from motionloom_lab.suites.duet_blocks import Beside
-from motionloom_lab.suites.duet_ways import FRAMES, GIVEN, Crops, Way
-from motionloom_lab.suites.harness import Run, Say, check_names, digest
-from motionloom_lab.suites.needs import NoData, pairs_of
-from motionloom_lab.suites.parts import Parts
-from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges, reported
+from motionloom_lab.suites.duet_ways import FRAMES, GIVEN, CompletionSettings, Crops, Way
+from motionloom_lab.suites.harness import Parts, Run, check_names, digest
+from motionloom_lab.suites.items import NoData, pairs_of
+from motionloom_lab.suites.protocol import reported
 from motionloom_train.data.pairs import Pair
+from motionloom_train.data.progress import Say
+
+LONGEST = 60
+"""Letters of a block's name in a table, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A block as a row."""
+
+    row: str
+    """Its own name, and its sizes."""
+    digest: str
+    """Of its file."""
+    way: Way
+
+
+def beside_rows(prior: Prior, files: Sequence[str | Path], how: CompletionSettings) -> tuple[Beside, ...]:
+    """The blocks of files, or shipped ones, all over ``prior``.
+
+    Raises MotionloomError for a file that is none, for another prior's block, and for two blocks of one name.
+    """
+    found: dict[str, Beside] = {}
+    for file in files:
+        block = PairBlock.load(file, prior)
+        name = " ".join(block.name.split())[:LONGEST]
+        if name in found:
+            raise MotionloomError(f"two of the blocks to stand beside are called {name!r}; give each a name of its own")
+        path = blocks().get(str(file)) or Path(file)
+        found[name] = Beside(f"{name}: {sizes(block)}", digest(path)[:12], ways.sampled(prior, block.net(prior), how))
+    return tuple(found.values())
+
+
+def sizes(block: PairBlock) -> str:
+    """What tells blocks of one prior apart: 2 layers after layer 6."""
+    config = block.config
+    unaware = "" if config.aware else ", not aware"
+    return f"{config.layers} {'layer' if config.layers == 1 else 'layers'} after layer {config.split}{unaware}"
+
 
 KINDS = ("real", "zero", "constant", "silent", "communication", "ours", "mrt")
 """Rows of the table; ``silent``: the prior without communication; ``communication``: that alone."""
@@ -48,29 +82,6 @@ ZERO, CONSTANT, SILENT, ALONE, MRT = (
     "multi-range transformer",
 )
 COLUMNS = columns("duet-completion")
-
-
-@dataclass(frozen=True)
-class CompletionSettings:
-    """How completions are measured."""
-
-    crops: int = 200
-    samples: int = 5
-    """Completions of each crop; their mean is a row of its own."""
-    steps: int = STEPS
-    guidance: float = 1.0
-    prompt: str = ""
-    """The prompt of the networks; published: none."""
-    given: str = "past"
-    """What of the first second is known, see `duet_ways.GIVEN`."""
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        check_ranges(
-            self, {"crops": (1, 10_000), "samples": (1, 100), "steps": (1, 1000), "guidance": GUIDANCES, "seed": SEEDS}
-        )
-        if self.given not in GIVEN:
-            raise MotionloomError(f"what is given is one of {', '.join(GIVEN)}; got {self.given[:40]!r}")
 
 
 QUICK = CompletionSettings(crops=6, samples=2, steps=6)
@@ -93,7 +104,7 @@ def run(
         run: the prior, the data, and where pieces are kept.
         block: a shipped name or a file; None: the shipped one.
         communication: a block trained over `duet_ways.bare`; None: no such row.
-        mrt: a file of `lab.papers.mrt_training`; None: no such row.
+        mrt: a file of `lab.papers.mrt`; None: no such row.
         beside: other blocks for the same prior, each a row of its own, of one sample.
         how: how completions are measured.
         kinds: the rows, out of `KINDS`.
@@ -104,7 +115,7 @@ def run(
     prior = Prior.load(run.weights, device=run.device)
     found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
     made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=run.device)
-    others = duet_blocks.beside(prior, beside, _sampling(how))
+    others = beside_rows(prior, beside, how)
     crops = draw(held_out(pairs_of(run.data, captions=False, say=run.progress)), how)
     about = {
         "weights": run.label,
@@ -157,21 +168,15 @@ def ways_of(
     device: str = "cpu",
 ) -> dict[str, Way]:
     """Every way that there are weights for, by its kind."""
-    asked = _sampling(how)
     found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
-    found["silent"] = ways.sampled(prior, ways.no_communication_net(prior), **asked)
+    found["silent"] = ways.sampled(prior, ways.no_communication_net(prior), how)
     if communication is not None and "communication" in kinds:
-        found["communication"] = ways.sampled(*ways.only_communication(prior, communication), **asked)
+        found["communication"] = ways.sampled(*ways.only_communication(prior, communication), how)
     if block is not None:
-        found["ours"] = ways.sampled(prior, block.net(prior), **asked)
+        found["ours"] = ways.sampled(prior, block.net(prior), how)
     if mrt is not None and "mrt" in kinds:
         found["mrt"] = ways.by_mrt(MrtFile.load(mrt, device=device).net)
     return found
-
-
-def _sampling(how: CompletionSettings) -> dict[str, Any]:
-    """What `duet_ways.sampled` takes."""
-    return {"given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt}
 
 
 def measure(
@@ -210,16 +215,9 @@ def measure(
         errors[one.row] = (one.row, numbers)
         rows.append(_row(one.row, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
     said |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
-    others = published("duet-completion", [column.name for column in COLUMNS]) if with_published else ()
-    return Report(
-        "duet-completion",
-        "Two people: three seconds after one",
-        run.command,
-        said,
-        COLUMNS,
-        (*rows, *others),
-        (*verdicts(errors), *notes("duet-completion")),
-    )
+    under = (*verdicts(errors), *notes("duet-completion"))
+    others = "duet-completion" if with_published else ""
+    return run.report("duet-completion", "Two people: three seconds after one", said, rows, under, beside=others)
 
 
 def _row(name: str, numbers: Mapping[str, Array]) -> Row:

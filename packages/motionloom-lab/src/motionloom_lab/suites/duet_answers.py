@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -17,13 +16,12 @@ from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
-from motionloom_lab.report.report import Report, Value
+from motionloom_lab.report.report import Value
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import duet_text as judged
 from motionloom_lab.suites.duet import HELD_OUT
-from motionloom_lab.suites.duet_text import KINDS, NOTES, DuetSettings, Make, Table
-from motionloom_lab.suites.harness import Run
-from motionloom_lab.suites.needs import NoData
+from motionloom_lab.suites.duet_text import NOTES, DuetSettings, Make, Parts, Table
+from motionloom_lab.suites.items import NoData
 from motionloom_train.data.pairs import Pair
 
 FULL, QUICK = judged.FULL, judged.QUICK
@@ -69,23 +67,11 @@ class Windows:
         return [window for caption, count, seed in turns for window in self.draw(caption, count, seed)]
 
 
-def run(
-    run: Run, *, block: str | Path | None = None, how: DuetSettings | None = None, kinds: Sequence[str] = KINDS
-) -> Report:
-    """Measure a two-person block on people of the held-out pairs of ``run.data``; arguments as of `duet_text.run`."""
-    how = how or DuetSettings()
-    prior, found, pairs, about = judged.opened(run, block, kinds)
+def parts(prior: Prior, block: PairBlock, pairs: Sequence[Pair], how: DuetSettings) -> Parts:
+    """Answers to people of the held-out pairs."""
     given = Windows.of(pairs, how)
-    return judged.measure(
-        pairs,
-        answers(prior, found, given, how),
-        alone(prior, given, how),
-        how,
-        table=table(given, how),
-        run=run,
-        kinds=kinds,
-        about=about | {"given": "one of the two in random windows of validation and test pairs"},
-    )
+    about = {"given": "one of the two in random windows of validation and test pairs"}
+    return table(given, how), answers(prior, block, given, how), alone(prior, given, how), about
 
 
 def table(given: Windows, how: DuetSettings) -> Table:

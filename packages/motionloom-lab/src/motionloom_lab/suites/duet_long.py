@@ -3,9 +3,8 @@
 Their last stretch, and their first, are judged as duets from words are.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
@@ -18,12 +17,10 @@ from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
-from motionloom_lab.report.report import Report
 from motionloom_lab.report.tables import notes
 from motionloom_lab.suites import duet_text as judged
 from motionloom_lab.suites.duet_answers import own_seed
-from motionloom_lab.suites.duet_text import KINDS, NOTES, Make, Table
-from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.duet_text import NOTES, Make, Parts, Table
 from motionloom_lab.suites.protocol import check_ranges
 from motionloom_train.data.pairs import Pair
 
@@ -45,23 +42,11 @@ class LongDuetSettings(judged.DuetSettings):
 FULL, QUICK = LongDuetSettings(), LongDuetSettings(duets=2, steps=6, segments=2)
 
 
-def run(
-    run: Run, *, block: str | Path | None = None, how: LongDuetSettings | None = None, kinds: Sequence[str] = KINDS
-) -> Report:
-    """Measure a two-person block on long duets for the captions of train pairs; arguments as of `duet_text.run`."""
-    how = how or LongDuetSettings()
-    prior, found, pairs, about = judged.opened(run, block, kinds)
+def parts(prior: Prior, block: PairBlock, pairs: Sequence[Pair], how: LongDuetSettings) -> Parts:
+    """Long duets for the captions of the train pairs."""
     said = judged.captions_of(pairs)
-    return judged.measure(
-        pairs,
-        ours(prior, found, said, how),
-        alone(prior, pairs, said, how),
-        how,
-        table=table(said, how),
-        run=run,
-        kinds=kinds,
-        about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
-    )
+    about = {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"}
+    return table(said, how), ours(prior, block, said, how), alone(prior, pairs, said, how), about
 
 
 def table(captions: tuple[str, ...], how: LongDuetSettings) -> Table:
@@ -83,7 +68,7 @@ def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: LongDuetS
             pieces = list(
                 compose_pair(prior, block, timeline(captions, caption, how), seed=own_seed(seed, number), **how.drawing)
             )
-            made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
+            made.append((concatenate(*(a for a, _ in pieces)), concatenate(*(b for _, b in pieces))))
         return made
 
     return make
@@ -94,7 +79,7 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: Lon
     begun = judged.beginnings(pairs, how)
 
     def one(caption: str, seed: int) -> Motion:
-        return _whole(compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing))
+        return concatenate(*compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing))
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         made = []
@@ -113,7 +98,3 @@ def timeline(captions: Sequence[str], caption: str, how: LongDuetSettings) -> li
     """``how.segments`` captions in turn, the first of which is ``caption``."""
     first = captions.index(caption)
     return [Segment(captions[(first + n) % len(captions)], how.seconds) for n in range(how.segments)]
-
-
-def _whole(pieces: Iterable[Motion]) -> Motion:
-    return concatenate(*pieces)

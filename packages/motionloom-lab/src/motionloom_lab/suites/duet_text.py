@@ -28,10 +28,11 @@ from motionloom_lab.report.report import REAL, Column, Report, Row, Value
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites.duet import HELD_OUT, chosen_block
 from motionloom_lab.suites.duet_ways import no_communication_net
-from motionloom_lab.suites.harness import Run, Say, check_names
-from motionloom_lab.suites.needs import pairs_of
+from motionloom_lab.suites.harness import Run, check_names
+from motionloom_lab.suites.items import pairs_of
 from motionloom_lab.suites.protocol import SEEDS, check_ranges, reported
 from motionloom_train.data.pairs import Pair, windows
+from motionloom_train.data.progress import Say
 
 KINDS = ("real", "held-out", "strangers", "ours", "our-strangers", "silent")
 """Rows of the table."""
@@ -40,16 +41,16 @@ DEEP = 3.0
 FEW = 24
 """Duets whose synchrony is held against all their shuffles."""
 _STATS = {
-    "distance": ("distance", 1.0),
-    "looking_away": ("looking_away", 180 / np.pi),
-    "hand_contact": ("hand_contact", 1.0),
-    "touch": ("touch", 1.0),
-    "penetration": ("penetration", 100.0),
-    "skate_share": ("skate_share", 100.0),
-    "skate_speed": ("skate_speed", 1.0),
-    "skate_slide": ("skate_slide", 1.0),
+    "distance": 1.0,
+    "looking_away": 180 / np.pi,
+    "hand_contact": 1.0,
+    "touch": 1.0,
+    "penetration": 100.0,
+    "skate_share": 100.0,
+    "skate_speed": 1.0,
+    "skate_slide": 1.0,
 }
-"""Columns out of `PairStats`: which number, and times what."""
+"""Columns out of `pair_stats`, and times what."""
 COLUMNS = columns("duet-text")
 
 
@@ -90,11 +91,6 @@ Cut = Callable[[Array], Array]
 NOTES = notes("duets")
 
 
-def whole(duet: Array) -> Array:
-    """All of it."""
-    return duet
-
-
 @dataclass(frozen=True)
 class Table:
     """Which duets are measured, and what of them."""
@@ -104,7 +100,7 @@ class Table:
     captions: tuple[str, ...]
     """What duets are made for, in turn."""
     notes: tuple[str, ...] = NOTES
-    cuts: tuple[tuple[str, Cut], ...] = (("", whole),)
+    cuts: tuple[tuple[str, Cut], ...] = (("", lambda duet: duet),)
     """Stretches that are rows, and what the rows' names end in; strangers are of the first, and so is the prior without
     communication."""
     columns: tuple[Column, ...] = COLUMNS
@@ -112,40 +108,46 @@ class Table:
     """Further columns of all that was made, in the order of `turns`."""
 
 
+Parts = tuple[Table, Make, Make, dict[str, Any]]
+"""A suite of duets: its table, duets of the block, duets of the prior alone, and what its protocol also says."""
+
+
 def run(
-    run: Run, *, block: str | Path | None = None, how: DuetSettings | None = None, kinds: Sequence[str] = KINDS
+    run: Run,
+    parts_of: Callable[[Prior, PairBlock, Sequence[Pair], Any], Parts],
+    *,
+    block: str | Path | None = None,
+    how: DuetSettings,
+    kinds: Sequence[str] = KINDS,
 ) -> Report:
     """Measure a two-person block against the pairs of ``run.data`` and their captions.
 
     Args:
         run: the prior and the data.
+        parts_of: the suite: `parts` of this module, of `duet_answers` or of `duet_long`.
         block: a shipped name or a file; None: the shipped one.
         how: how duets are made and measured.
         kinds: the rows, out of `KINDS`.
     """
-    how = how or DuetSettings()
-    prior, found, pairs, about = opened(run, block, kinds)
-    ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
-        prior, found, caption, seconds=how.seconds, count=count, seed=seed, **how.drawing
-    )
-    return measure(
-        pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), run=run, kinds=kinds, about=about
-    )
-
-
-def opened(
-    run: Run, block: str | Path | None, kinds: Sequence[str]
-) -> tuple[Prior, PairBlock, list[Pair], dict[str, Any]]:
-    """The prior, the block and the pairs with their captions, and what the protocol says of them."""
     check_names(kinds, KINDS, "rows")
     prior = Prior.load(run.weights, device=run.device)
-    found = PairBlock.load(chosen_block(block), prior)
-    about = {"weights": run.label, "block": found.name, "device": run.device}
-    return prior, found, pairs_of(run.data, say=run.progress), about
+    loaded = PairBlock.load(chosen_block(block), prior)
+    pairs = pairs_of(run.data, say=run.progress)
+    table, ours, silent, about = parts_of(prior, loaded, pairs, how)
+    about = {"weights": run.label, "block": loaded.name, "device": run.device} | about
+    return measure(pairs, ours, silent, how, table=table, run=run, kinds=kinds, about=about)
+
+
+def parts(prior: Prior, block: PairBlock, pairs: Sequence[Pair], how: DuetSettings) -> Parts:
+    """Duets for the captions of the train pairs."""
+    ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
+        prior, block, caption, seconds=how.seconds, count=count, seed=seed, **how.drawing
+    )
+    return text_table(pairs), ours, beside(prior, pairs, how), {}
 
 
 def text_table(pairs: Sequence[Pair]) -> Table:
-    """Duets for the captions of the train pairs."""
+    """The columns of duets from words."""
     return Table("duet-text", "Two people from words", captions_of(pairs), (*NOTES, *notes("duet-text")))
 
 
@@ -214,9 +216,8 @@ def measure(
                 strangers = groups.shuffled(clips)
                 rows.append(_row(f"{name}{end}, partners shuffled", strangers, real, more=table.more(strangers)))
     said = protocol_of(recorded, table.captions, how) | (about or {})
-    return Report(
-        table.suite, table.title, run.command, said, table.columns, tuple(rows), (*verdicts(rows), *table.notes)
-    )
+    under = (*verdicts(rows), *table.notes)
+    return run.report(table.suite, table.title, said, rows, under, columns=table.columns)
 
 
 def _recorded(pairs: Sequence[Pair], frames: int) -> dict[str, list[Array]]:
@@ -280,11 +281,9 @@ def _row(
     more: Mapping[str, Value] | None = None,
 ) -> Row:
     stats = [mp.pair_stats(clip) for clip in clips]
-    values = {
-        column: Value.of([times * getattr(one, which) for one in stats]) for column, (which, times) in _STATS.items()
-    }
+    values = {name: Value.of([times * one[name] for one in stats]) for name, times in _STATS.items()}
     some = [clips[k] for k in np.unique(np.linspace(0, len(clips) - 1, min(FEW, len(clips))).round().astype(int))]
-    values["synchrony"] = Value.of([one.speed_synchrony for one in stats])
+    values["synchrony"] = Value.of([one["speed_synchrony"] for one in stats])
     if len(some) > 1:
         values["over_strangers"] = Value(groups.synchrony_against_shuffled(some).size)
     if real is not None:

@@ -12,6 +12,7 @@ import torch
 from torch import nn
 
 from motionloom.diffusion import row_seed
+from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.pair import PairMotion
 from motionloom.kinematics.physics import Array
@@ -19,11 +20,13 @@ from motionloom.runtime.pair import PairSession
 from motionloom.tasks.long import holding_correction
 from motionloom.tasks.pair import PairEdits, pair_features, person_seeds
 from motionloom.tasks.people import known_state
+from motionloom.tasks.text import STEPS
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, save_prior
 from motionloom_lab.metrics.pair import PREFIX
 from motionloom_lab.metrics.prediction import constant_velocity, zero_velocity
 from motionloom_lab.papers.mrt import Mrt, completed
+from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
 from motionloom_train.export import pair_graph
 from motionloom_train.modules import arrays, prior_module, prior_session
 from motionloom_train.nets.pair import Talk, fitting
@@ -52,6 +55,29 @@ FRAMES = 80
 GIVEN: dict[str, tuple[int, bool]] = {"past": (PREFIX, False), "tool": (PREFIX, True), "published": (PREFIX - 1, True)}
 """Feature frames known beside D, and whether the velocity out of the last one is the true one, a frame ahead."""
 _UP = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class CompletionSettings:
+    """How completions are measured."""
+
+    crops: int = 200
+    samples: int = 5
+    """Completions of each crop; their mean is a row of its own."""
+    steps: int = STEPS
+    guidance: float = 1.0
+    prompt: str = ""
+    """The prompt of the networks; published: none."""
+    given: str = "past"
+    """What of the first second is known, see `GIVEN`."""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_ranges(
+            self, {"crops": (1, 10_000), "samples": (1, 100), "steps": (1, 1000), "guidance": GUIDANCES, "seed": SEEDS}
+        )
+        if self.given not in GIVEN:
+            raise MotionloomError(f"what is given is one of {', '.join(GIVEN)}; got {self.given[:40]!r}")
 
 
 def by_rule(rule: Callable[[np.ndarray, int], Array]) -> Way:
@@ -94,40 +120,30 @@ def visible_part(crop: np.ndarray, given: str) -> np.ndarray:
     return np.concatenate([past, 2 * past[:, -1:] - past[:, -2:-1]], axis=1)
 
 
-def sampled(
-    prior: Prior,
-    net: PairSession,
-    *,
-    given: str = "past",
-    seed: int = 0,
-    steps: int,
-    guidance: float = 1.0,
-    prompt: str = "",
-    make: Features = pair_features,
-) -> Way:
+def sampled(prior: Prior, net: PairSession, how: CompletionSettings, make: Features = pair_features) -> Way:
     """Two people from a prior and a block, with noise of (seed, sample, number of the crop).
 
-    With ``given`` "past" everything is as `tasks.pair.complete_pair` has it, and nothing after the given frames is
-    looked at; "tool" and "published" are the published tool and evaluation, which know the velocity out of the last
-    given frame, and have no smooth way out of the past.
+    With "past" given everything is as `tasks.pair.complete_pair` has it, and nothing after the given frames is looked
+    at; "tool" and "published" are the published tool and evaluation, which know the velocity out of the last given
+    frame, and have no smooth way out of the past.
     """
 
     def way(crops: Crops, sample: int) -> Array:
-        worlds = [visible_part(crop, given) for crop in crops.positions]
+        worlds = [visible_part(crop, how.given) for crop in crops.positions]
         known = PairMotion.stack([two.encode(world) for world in worlds])
         people = [person for one in known.features for person in one]
         leaving = [holding_correction(person, prior, FRAMES) for person in people]
         sampled = make(
             prior,
             net,
-            [prompt] * len(people),
+            [how.prompt] * len(people),
             FRAMES,
-            seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
+            seeds=[s for number in crops.numbers for s in person_seeds(row_seed(how.seed, sample), number)],
             edits=PairEdits(
-                known_state(net, known, FRAMES), leaving if given == "past" else None, frozen=[False] * len(people)
+                known_state(net, known, FRAMES), leaving if how.given == "past" else None, frozen=[False] * len(people)
             ),
-            guidance=guidance,
-            steps=steps,
+            guidance=how.guidance,
+            steps=how.steps,
         )
         floors = np.stack([two.floors(world) for world in worlds])
         return (

@@ -19,7 +19,7 @@ from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import Report
 from motionloom_lab.report.results import FILES
 from motionloom_lab.suites.harness import digest, evaluator_file, weight_marks
-from motionloom_lab.suites.needs import NoData
+from motionloom_lab.suites.items import NoData
 from motionloom_lab.suites.registry import SUITES, Job, Suite
 
 QUICK = "Quick run: few seeds and clips, to see that everything works; these are no numbers to quote."

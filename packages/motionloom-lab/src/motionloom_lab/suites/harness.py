@@ -1,8 +1,13 @@
-"""What all suites share: where and how they measure, what is opened and refused first, and rows over replications."""
+"""What all suites share: where and how they measure, what is opened and refused first, rows over replications, and
+finished pieces of a long run, each in a small file of its own, so that a run that was stopped goes on.
+"""
 
+import hashlib
+import json
+import math
 import re
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -10,20 +15,94 @@ from typing import Any, Protocol
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.features import humanml
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.goals.sequence import split_actions
+from motionloom.goals.timeline import timeline_of
+from motionloom.io.text import plain_json
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_bytes
+from motionloom.tasks.long import compose
+from motionloom.tasks.splice import concatenate
+from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.container import weights_digest
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.evaluator import evaluators, own
 from motionloom_lab.evaluator.evaluators import Evaluator
 from motionloom_lab.metrics import retrieval
 from motionloom_lab.metrics.skate import skate
-from motionloom_lab.report.report import Column, Row, Value
-from motionloom_lab.suites.parts import Parts, fingerprint
+from motionloom_lab.report import tables
+from motionloom_lab.report.files import write_json
+from motionloom_lab.report.report import Column, Report, Row, Value
+from motionloom_train.data.paths import DAMAGED
+from motionloom_train.data.progress import Say, silent
 
-Say = Callable[[str], None]
-"""Called with a line of progress now and then."""
+LARGEST = 1 << 20
+
+
+def fingerprint(settings: Mapping[str, Any]) -> str:
+    """Changes whenever a setting does; settings are plain JSON data."""
+    said = json.dumps(settings, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(said.encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The pieces of one run: ``FOLDER/parts/NAME.json`` holds a piece's numbers and the fingerprint of their settings.
+
+    Without a folder nothing is kept and nothing found.
+    """
+
+    folder: Path | None
+    settings: str
+    """`fingerprint` of everything that changes a piece's numbers."""
+
+    def path(self, name: str) -> Path | None:
+        """Where the piece lies; the name is made safe for a file."""
+        return self.folder / "parts" / f"{re.sub(r'[^a-z0-9]+', '-', name.lower())}.json" if self.folder else None
+
+    def find(self, name: str) -> dict[str, float] | None:
+        """The numbers of a piece that is finished, None otherwise; MotionloomError for one of another run."""
+        path = self.path(name)
+        if path is None or not path.is_file():
+            return None
+        try:
+            found = plain_json(read_bytes(path, max_bytes=LARGEST))
+            settings, numbers = str(found["settings"]), {str(k): float(v) for k, v in found["numbers"].items()}
+            if not all(map(math.isfinite, numbers.values())):
+                raise ValueError("it holds numbers that are not finite")
+        except DAMAGED as error:
+            raise MotionloomError(f"{path} is not a part of this run ({error}); delete it to go on") from None
+        if settings != self.settings:
+            raise MotionloomError(
+                f"{path} was made with other settings; name another --out folder or delete {path.parent}"
+            )
+        return numbers
+
+    def keep(self, name: str, numbers: Mapping[str, float]) -> None:
+        """Write a finished piece, whole or not at all."""
+        path = self.path(name)
+        if path is not None:
+            write_json(path, {"settings": self.settings, "numbers": dict(numbers)})
+
+    def once(
+        self,
+        name: str,
+        make: Callable[[], Mapping[str, float]],
+        line: Callable[[Mapping[str, float]], str] | None = None,
+        progress: Say = silent,
+    ) -> dict[str, float]:
+        """The numbers of a piece: kept ones, or made and kept now, which ``line`` says in a line for ``progress``."""
+        found = self.find(name)
+        if found is None:
+            found = dict(make())
+            self.keep(name, found)
+            if line is not None:
+                progress(line(found))
+        return found
+
+
 CHUNK = 64
 """Motions embedded at once."""
 DIVERSITY_PAIRS = 300
@@ -37,10 +116,6 @@ class Generate(Protocol):
     def __call__(self, prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
         """One (frames, 22, 3) array in metres per prompt, and their frames per second."""
         ...
-
-
-def silent(line: str) -> None:
-    """Say nothing."""
 
 
 def say(line: str) -> None:
@@ -90,6 +165,22 @@ class Run:
     def parts(self, settings: Mapping[str, Any]) -> Parts:
         """Where pieces of this run are kept."""
         return Parts(self.folder, fingerprint(settings))
+
+    def report(
+        self,
+        suite: str,
+        title: str,
+        protocol: Mapping[str, Any],
+        rows: Iterable[Row],
+        notes: Iterable[str],
+        *,
+        columns: tuple[Column, ...] | None = None,
+        beside: str = "",
+    ) -> Report:
+        """What a suite measured. columns: None: the suite's. beside: name of published rows that go under ``rows``."""
+        shown = columns or tables.columns(suite)
+        others = tables.published(beside, [column.name for column in shown]) if beside else ()
+        return Report(suite, title, self.command, protocol, shown, (*rows, *others), tuple(notes))
 
 
 def readable(prior: Prior, steps: int) -> Prior:
@@ -212,3 +303,49 @@ def row_of(
 def plain_row(name: str, numbers: Mapping[str, float]) -> Row:
     """Numbers that were measured once."""
     return Row(name, {key: Value(value) for key, value in numbers.items()})
+
+
+def generator(
+    prior: Prior,
+    *,
+    steps: int | None = None,
+    guidance: float | None = None,
+    solver: str | None = None,
+    finished: bool = False,
+    best_of: int = 1,
+) -> Generate:
+    """Text to joint positions as `motionloom generate` makes them; what is None keeps the default of `generate`.
+
+    Positions are measured as the network samples them, whose bones may breathe and whose feet may slide; ``finished``
+    measures what is exported: constant bones, planted feet held still. A sentence of several actions that follow each
+    other is a long motion (`goals.sequence`), which is measured as exported and keeps the usual solver; ``best_of``
+    says nothing of it either.
+    """
+    said = {"steps": steps, "guidance": guidance, "solver": solver}
+    how = {name: value for name, value in said.items() if value is not None}
+    long = (len(prior.mean), prior.fps) == (WIDTH, FPS)
+
+    def one_action(prompts: Sequence[str], seconds: float, seeds: Sequence[int]) -> list[Array]:
+        frames = [round(seconds * prior.fps)] * len(prompts)
+        if not frames:
+            return []
+        drawn = sample_features(prior, prompts, frames, seeds=list(seeds), best_of=best_of, **how)  # type: ignore[arg-type]
+        features = [one.astype(np.float64) for one in drawn]
+        if finished:
+            return [to_motion(one, prior.fps).positions() for one in features]
+        return [humanml.decode_positions(one) for one in features]
+
+    def several(prompt: str, seconds: float, seed: int) -> Array:
+        segments = timeline_of(prompt, seconds).segments
+        settings = {name: value for name, value in how.items() if name != "solver"}
+        return concatenate(*compose(prior, segments, seed=seed, **settings)).positions()  # type: ignore[arg-type]
+
+    def make(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
+        whole = [not long or len(split_actions(prompt)) == 1 for prompt in prompts]
+        single = [i for i, alone in enumerate(whole) if alone]
+        made = dict(zip(single, one_action([prompts[i] for i in single], seconds, [seed + i for i in single])))
+        for i in set(range(len(prompts))) - set(single):
+            made[i] = several(prompts[i], seconds, seed + i)
+        return [made[i] for i in range(len(prompts))], prior.fps
+
+    return make

@@ -1,23 +1,104 @@
-"""Captioned stretches of real motion: what generated motions are asked to show and are measured against.
+"""Real motion that suites compare with: clips and captioned stretches, and whether data hold what a suite measures.
 
 They come out of a built set, a folder of recordings, or HumanML3D as its authors lay it out (with its tokens).
 """
 
-from collections.abc import Iterator, Sequence
+import csv
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.io.atomic import finished
 from motionloom.io.text import read_utf8
+from motionloom.kinematics.physics import Array
 from motionloom_lab.evaluator.evaluators import Caption
-from motionloom_lab.suites.clips import plain_clips
+from motionloom_lab.papers.readers import find_pairs, find_takes
 from motionloom_lab.suites.protocol import MOST_ITEMS, Selection
-from motionloom_train.data.clips import Clip
+from motionloom_train.data.build import clips_of
+from motionloom_train.data.clips import Clip, read_clip
+from motionloom_train.data.pairs import Pair
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.sources import Take, listed_names, read_features
 from motionloom_train.data.words import check_caption
+
+LONGEST = 30 * FPS
+"""Frames: a collection's one line about a longer clip says too little about any part of it."""
+SHORTEST = 0.8 * FPS
+
+
+@dataclass(frozen=True)
+class RealClip:
+    """A recorded stretch and the words people have for it, on the uniform person at 20 frames per second."""
+
+    name: str
+    source: str
+    split: str
+    captions: tuple[str, ...]
+    """Empty where nobody described it."""
+    positions: Array
+    """(frames, 22, 3) metres."""
+
+    @property
+    def held_out(self) -> bool:
+        """True outside the training split."""
+        return self.split != "train"
+
+
+def real_clips(folder: Path | str) -> Iterator[RealClip]:
+    """The plain (not mirrored, not augmented) clips of a built set or of a folder of recordings, by captioned stretch.
+
+    A caption that somebody wrote for a stretch of a take goes before the collection's one line for the whole take.
+    """
+    folder = Path(folder)
+    found = False
+    for clip in plain_clips(folder):
+        for real in _stretches(clip):
+            found = True
+            yield real
+    if not found:
+        raise MotionloomError(f"{folder} has no clips to compare with; make a set with 'motionloom data build'")
+
+
+def plain_clips(
+    folder: Path, *, mirrored: bool = False, chosen: Callable[[Take], bool] = lambda take: True
+) -> Iterator[Clip]:
+    """The clips of a built set, or of the ``chosen`` recordings of a folder, that show what was recorded as it was.
+
+    ``mirrored``: their mirror images too.
+    """
+    if (folder / "clips").is_dir():
+        for path in finished(folder / "clips", "*.safetensors"):
+            derived = path.stem.endswith(("_looped", "_reversed")) or path.stem.startswith("mixed_")
+            if not derived and (mirrored or not path.stem.startswith("M")):
+                clip = read_clip(path)
+                if clip.way == "plain":
+                    yield clip
+        return
+    for take in filter(chosen, find_takes(folder)):
+        try:
+            yield from islice(clips_of(take), 1 + mirrored)
+        except MotionloomError:
+            continue  # too short or damaged: `data build` says which
+
+
+def _stretches(clip: Clip) -> Iterator[RealClip]:
+    positions = clip.positions()
+    notes = [note for note in clip.notes if note.kind == "human"]
+    if not notes and len(positions) <= LONGEST:
+        notes = [note for note in clip.notes if note.kind == "index"]
+    if not notes:
+        yield RealClip(clip.name, clip.source, clip.split, (), positions)
+    for note in notes:
+        part = positions[note.first : note.last]
+        if len(part) >= SHORTEST:
+            yield RealClip(f"{clip.name}@{note.first / FPS:g}", clip.source, clip.split, note.texts, part)
+
 
 SPARE = 4
 """Frames above the longest length that are cut off; a stretch that is longer still is left out."""
@@ -155,3 +236,62 @@ def _text(path: Path) -> str:
     except (OSError, MotionloomError) as error:
         said = getattr(error, "strerror", None) or str(error)
         raise MotionloomError(f"cannot read {path} ({said}); a HumanML3D folder has lists and texts") from None
+
+
+class NoData(MotionloomError):
+    """The kind of data that a suite needs is not there: nothing is wrong, and there is nothing to measure."""
+
+
+def pairs_of(data: Path | str | None, *, captions: bool = True, say: Say = silent) -> list[Pair]:
+    """`data.pairs.find_pairs`; raises NoData where a folder has no pairs at all, and as it does for pairs that are
+    not right."""
+    if data is None:
+        raise MotionloomError("two people are compared with real pairs, and none are shipped; name some with --data")
+    try:
+        return find_pairs(data, captions=captions, say=say)
+    except MotionloomError as error:
+        if Path(data).is_dir() and not has_pairs(Path(data)):
+            raise NoData(str(error)) from None
+        raise
+
+
+def has_pairs(folder: Path) -> bool:
+    """Whether anything in a folder says that it belongs to a pair, by the layouts of `find_pairs`."""
+    from motionloom_lab.papers.threedpw import is_3dpw
+
+    if (folder / "manifest.csv").is_file():
+        try:
+            with open(folder / "manifest.csv", newline="", encoding="utf-8") as lines:
+                return any(row.get("partner") for row in csv.DictReader(lines))
+        except (OSError, ValueError, csv.Error):
+            return True  # it cannot be read, which is another matter
+    if is_3dpw(folder):
+        return True
+    beside = any(re.fullmatch(r".+_[ab]", path.stem) for path in finished(folder, "*.bvh"))
+    return beside or bool(finished(folder, "*/[ab].bvh"))
+
+
+def need_pairs(data: Path) -> None:
+    """Raises NoData where a folder holds no pairs of people."""
+    if not has_pairs(data):
+        raise NoData(f"{data} holds no recordings of two people together")
+
+
+def need_captions(data: Path) -> None:
+    """Raises NoData where no held-out clip has a caption; MotionloomError where there are no clips."""
+    from motionloom_lab.suites.items import real_clips
+
+    if (data / "new_joint_vecs").is_dir():  # HumanML3D: a text for each motion
+        return
+    if not any(clip.held_out and clip.captions for clip in real_clips(data)):
+        raise NoData(f"no held-out clip of {data} has a caption")
+
+
+def need_recordings(data: Path) -> None:
+    """Raises NoData where a built set has no clip of CMU's test subjects; other folders are recognised as they are
+    read."""
+    from motionloom_lab.suites.prediction_trial import CMU_TEST
+
+    clips = data / "clips"
+    if clips.is_dir() and not any(path.stem.split("_")[0] in CMU_TEST for path in finished(clips, "*.safetensors")):
+        raise NoData(f"{data} has no recordings of the people whose futures are predicted")

@@ -119,10 +119,6 @@ def _double_take(
     return from_features(made)
 
 
-def _concatenated(wanted: Wanted) -> Long:
-    return from_features(np.concatenate(wanted.alone(wanted.frames)))
-
-
 def _slerp(wanted: Wanted) -> Long:
     """The blank frames belong to the later segment, which is generated so much shorter, as TEACH has it."""
     alone = wanted.alone([n - (BLANK if row else 0) for row, n in enumerate(wanted.frames)])
@@ -137,7 +133,7 @@ _MAKERS: Mapping[str, tuple[str, Callable[[Wanted], Long]]] = {
     "paper": ("DoubleTake, paper", partial(_double_take, mode="paper")),
     "first-take": ("first take only", partial(_double_take, first_take_only=True)),
     "second-take": ("second take only", partial(_double_take, second_take_only=True)),
-    "concatenation": ("concatenation", _concatenated),
+    "concatenation": ("concatenation", lambda wanted: from_features(np.concatenate(wanted.alone(wanted.frames)))),
     "slerp": ("segments + SLERP", _slerp),
     "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
     "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),

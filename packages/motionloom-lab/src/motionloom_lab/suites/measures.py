@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from motionloom.errors import MotionloomError
 from motionloom_lab.report.report import Report
-from motionloom_lab.suites import needs
+from motionloom_lab.suites.items import NoData
 
 if TYPE_CHECKING:
     from motionloom_lab.suites.protocol import Selection
@@ -113,7 +113,7 @@ def _mrt(job: "Job", asked: Asked) -> Path | None:
     if own is None or steps < 1:
         raise MotionloomError("--train-mrt needs one step or more, and --out FOLDER for its weights")
     if not own.is_file():
-        from motionloom_lab.papers.mrt_training import RECIPE, train_mrt
+        from motionloom_lab.papers.mrt import RECIPE, train_mrt
         from motionloom_lab.papers.readers import find_pairs
         from motionloom_train.loop import Training
 
@@ -131,9 +131,11 @@ def _duets(name: str) -> Callable[["Job", Asked], Report]:
     def measure(job: "Job", asked: Asked) -> Report:
         from importlib import import_module
 
+        from motionloom_lab.suites import duet_text
+
         module: ModuleType = import_module(f"motionloom_lab.suites.duet_{name}")
         how = with_asked(module.QUICK if asked.get("quick") else module.FULL, asked)
-        return module.run(job.run(f"duet-{name}"), block=asked.get("block"), how=how)
+        return duet_text.run(job.run(f"duet-{name}"), module.parts, block=asked.get("block"), how=how)
 
     return measure
 
@@ -148,7 +150,7 @@ def obedience(job: "Job", asked: Asked) -> Report:
     run, seeds = job.run("obedience"), asked["seeds"]
     generate = job.tools.generator(False)
     results = obey.run(run, generate=generate, seeds=seeds, paraphrases=asked["paraphrases"])
-    return physical.obedience_report(results, command=run.command, settings={"seeds": seeds})
+    return physical.obedience_report(results, run=run, settings={"seeds": seeds})
 
 
 def realism(job: "Job", asked: Asked) -> Report:
@@ -157,11 +159,11 @@ def realism(job: "Job", asked: Asked) -> Report:
 
     wanted, real, about = physical.realism_orders(job.data, asked["count"])
     if not wanted:
-        raise needs.NoData(f"{job.data} has no held-out captioned clips of 2 to 10 s; leave --data out")
+        raise NoData(f"{job.data} has no held-out captioned clips of 2 to 10 s; leave --data out")
     run, made, fps = job.run("realism"), {}, 0.0
     for name, finished in ((physical.AS_DRAWN, False), (physical.AS_EXPORTED, True)):
         made[name], fps = realism.run(run, wanted, generate=job.tools.generator(finished))
-    return physical.realism_report(made, fps, real, command=run.command, protocol={**asked, **about})
+    return physical.realism_report(made, fps, real, run=run, protocol={**asked, **about})
 
 
 def evaluator(job: "Job", asked: Asked) -> Report:
@@ -188,4 +190,4 @@ def speed(job: "Job", asked: Asked) -> Report:
     """Time and memory."""
     from motionloom_lab.suites import physical
 
-    return physical.speed_report(job.tools.speed(asked["quick"]), command=job.run("speed").command)
+    return physical.speed_report(job.tools.speed(asked["quick"]), run=job.run("speed"))

@@ -8,16 +8,22 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median_high
 from typing import Any
 
 from motionloom.errors import MotionloomError
+from motionloom.io.atomic import with_folders
 from motionloom.io.text import plain_json
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.kinematics.physics import Array
 from motionloom.reading import read_bytes
+from motionloom.viz import draw
+from motionloom.viz.grid import draw_grid
 from motionloom.weights.prior import Prior
-from motionloom_lab.metrics.obedience import CHECKS, Check
+from motionloom_lab.metrics.obedience import CHECKS, THEMES, Check
 from motionloom_lab.report.files import check_report, write_json
-from motionloom_lab.suites.generator import generator
-from motionloom_lab.suites.harness import Generate, Run
+from motionloom_lab.suites.harness import Generate, Run, generator
+from motionloom_train.data.paths import DAMAGED
 
 ENOUGH = 0.9
 """Share of seeds that must obey for a prompt to count as obeyed."""
@@ -124,7 +130,7 @@ def _read(path: Path, settings: dict[str, Any]) -> dict[str, list[Attempt]]:
         if kept["settings"] != settings:
             raise MotionloomError(f"{path} was made with other settings; name another --out folder or delete it")
         return {str(check["name"]): [_attempt(a) for a in check["attempts"]] for check in kept["checks"]}
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except DAMAGED as error:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path} is not a result of this command ({error!r}); delete it to begin again") from None
@@ -210,7 +216,8 @@ def table(
         own = result.of(check.prompt)
         other = [a for a in result.attempts if a.prompt != check.prompt]
         seen = "; ".join(
-            f"{_median([a.measured.get(b.measure, float('nan')) for a in own]):g} of {b.text()}" for b in check.bounds
+            f"{median_high([a.measured.get(b.measure, float('nan')) for a in own]):g} of {b.text()}"
+            for b in check.bounds
         )
         known = (real or {}).get(check.name, {})
         rows.append(
@@ -228,6 +235,48 @@ def table(
     return [[row[k] for k in kept] for row in rows]
 
 
-def _median(values: Sequence[float]) -> float:
-    ordered = sorted(values)
-    return ordered[len(ordered) // 2] if ordered else float("nan")
+DONE, NOT_DONE = draw.CONTACT, (208, 62, 62)
+"""Colours before the captions of a picture: the check holds, or it does not."""
+
+
+def themes(results: Sequence[Result]) -> list[list[str]]:
+    """Rows of text, the heading first: theme, prompts, those on 9 and on 7 of 10 seeds, share of all seeds."""
+    rows = [["theme", "prompts", f"on {ENOUGH:.0%} of seeds", f"on {MOSTLY:.0%}", "of all seeds"]]
+    by_name = {result.name: result for result in results}
+    for theme, checks in THEMES.items():
+        found = [(by_name[c.name], c) for c in checks if c.name in by_name]
+        if found:
+            total = totals([r for r, _ in found], [c for _, c in found])
+            counts = [total["prompts"], total["prompts_obeyed"], total["prompts_mostly_obeyed"]]
+            rows.append([theme, *(f"{n:g}" for n in counts), f"{total['seeds_obeyed_share']:.0%}"])
+    return rows
+
+
+class FirstDraws:
+    """A generator that remembers the first motion of every prompt, for the picture."""
+
+    def __init__(self, generate: Generate) -> None:
+        self._generate = generate
+        self._kept: dict[str, tuple[Array, float]] = {}
+
+    def __call__(self, prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
+        """As the generator inside."""
+        motions, fps = self._generate(prompts, seconds=seconds, seed=seed)
+        if motions:
+            self._kept.setdefault(prompts[0], (motions[0], fps))
+        return motions, fps
+
+    def draw(self, checks: Sequence[Check], path: Path, *, seed: int) -> Path:
+        """A picture of the first draw of every check: six poses, the prompt, green where it obeys and red where not.
+
+        What was not generated here (a run that went on from files) is generated now, from ``seed``.
+        """
+        motions, marks = [], []
+        for check in checks:
+            if check.prompt not in self._kept:
+                self([check.prompt], seconds=check.seconds, seed=seed)
+            positions, fps = self._kept[check.prompt]
+            motions.append(motion_from_positions(positions, fps))
+            marks.append(DONE if check.obeyed(check.measured(positions, fps)) else NOT_DONE)
+        with with_folders(path.parent):
+            return draw_grid(motions, path, captions=[check.prompt for check in checks], marks=marks)

@@ -30,12 +30,12 @@ def commands() -> dict[str, Command]:
     """All commands by name."""
     found = read_table("motionloom_lab.suites", "options.toml")
     shared = found.pop("shared")
-    return {name: _command(name, row, shared | row.get("own", {})) for name, row in found.items()}
-
-
-def _command(name: str, row: Mapping[str, Any], rows: Mapping[str, dict[str, Any]]) -> Command:
-    options = [Option.of(option, rows[option]) for option in row["options"]]
-    return Command(name, row["help"], row.get("run", "measured"), tuple(options))
+    made = {}
+    for name, row in found.items():
+        rows = shared | row.get("own", {})
+        options = tuple(Option.of(option, rows[option]) for option in row["options"])
+        made[name] = Command(name, row["help"], row.get("run", "measured"), options)
+    return made
 
 
 def typed(command: Command, given: Mapping[str, Any]) -> str:

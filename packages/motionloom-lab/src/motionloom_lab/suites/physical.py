@@ -15,7 +15,8 @@ from motionloom_lab.metrics.realism import realism as numbers_of
 from motionloom_lab.report.report import REAL, Column, Report, Row, Value
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import bodies, obey, realism
-from motionloom_lab.suites.clips import real_clips
+from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.items import real_clips
 from motionloom_lab.suites.reference import known
 
 AS_DRAWN, AS_EXPORTED = "generated", "generated, as exported"
@@ -23,7 +24,7 @@ RESAMPLES = 400
 
 
 def obedience_report(
-    results: Sequence[obey.Result], checks: Sequence[Check] = CHECKS, *, command: str, settings: Mapping[str, Any]
+    results: Sequence[obey.Result], checks: Sequence[Check] = CHECKS, *, run: Run, settings: Mapping[str, Any]
 ) -> Report:
     """One row per prompt and one for all: shares of seeds that obey, beside what real clips of the action pass."""
     by_name, real = {check.name: check for check in checks}, known()["checks"]
@@ -41,9 +42,7 @@ def obedience_report(
     note = f"{found['prompts_obeyed']} of {found['prompts']} prompts are obeyed on {obey.ENOUGH:.0%} of their seeds."
     protocol = {"checks": obey.fingerprint(checks), **settings}
     title = "Obedience: does it do what the words say"
-    return Report(
-        "obedience", title, command, protocol, columns("obedience"), (Row("all prompts", total), *rows), (note,)
-    )
+    return run.report("obedience", title, protocol, (Row("all prompts", total), *rows), (note,))
 
 
 def _share(passed: int, tried: int) -> Value:
@@ -77,7 +76,7 @@ def realism_report(
     fps: float,
     real: Sequence[Array] | Mapping[str, float],
     *,
-    command: str,
+    run: Run,
     protocol: Mapping[str, Any],
 ) -> Report:
     """A row of real motion (clips at 20 frames per second, or finished averages) and one per group of motions.
@@ -105,10 +104,9 @@ def realism_report(
         if not isinstance(real, Mapping) and fps == FPS:
             values["speed_distance"] = Value(speed_distance(list(clips), list(real), FPS))
         rows.append(Row(name, values))
-    title = "Realism: does it move like real people"
-    return Report(
-        "realism", title, command, protocol, (*shown, *columns("realism-body")), tuple(rows), (*said, *notes("realism"))
-    )
+    said += notes("realism")
+    shown += columns("realism-body")
+    return run.report("realism", "Realism: does it move like real people", protocol, rows, said, columns=tuple(shown))
 
 
 def body_values(held: Mapping[str, Any], count: int) -> dict[str, Value]:
@@ -134,7 +132,7 @@ def realism_orders(data: Path | None, count: int) -> tuple[list[realism.Order], 
     return realism.orders(chosen), [clip.positions for clip in chosen], about
 
 
-def speed_report(found: Mapping[str, Any], *, command: str) -> Report:
+def speed_report(found: Mapping[str, Any], *, run: Run) -> Report:
     """`motionloom bench`'s numbers as a report of one row, each number with its target."""
     machine = {name: value for name, value in found["machine"].items() if name != "load"}
     shown, values = [], {}
@@ -149,4 +147,4 @@ def speed_report(found: Mapping[str, Any], *, command: str) -> Report:
         notes.append(f"The machine was busy when this began (load {found['machine']['load']}).")
     protocol = {"machine": machine, "repeats": "few" if found["quick"] else "full"}
     title = "Speed: time and memory as ratios within one run"
-    return Report("speed", title, command, protocol, tuple(shown), (Row("this machine", values),), tuple(notes))
+    return run.report("speed", title, protocol, [Row("this machine", values)], notes, columns=tuple(shown))

@@ -2,27 +2,28 @@
 
 Rows: the real futures, both baselines that need no model, the weights as they are sampled by default and with many
 steps, and the same weights by the published recipe (`lab.papers.humanmac`). Every number is a mean over windows; see
-`motionloom_lab.metrics.prediction` for what each is. What others published stands apart (`published_rows`).
+`motionloom_lab.metrics.prediction` for what each is. What others published is kept apart (`report.tables`).
 """
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.requests.sampling import PredictionSampling
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.metrics.prediction import Singles
 from motionloom_lab.papers.humanmac import published_futures
-from motionloom_lab.report.published_rows import published
 from motionloom_lab.report.report import REAL, SAME, Report, Row
-from motionloom_lab.report.tables import columns, notes
+from motionloom_lab.report.tables import columns, notes, published
 from motionloom_lab.suites import prediction_trial as trials
-from motionloom_lab.suites.harness import Run, check_names, check_steps, digest, row_of
+from motionloom_lab.suites.harness import Run, check_names, check_steps, digest, replicated, row_of
 from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, Way
 from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges, reported
 
@@ -113,55 +114,21 @@ def measure(
     parts = run.parts({**said, **asdict(how), "windows chosen": _identity(trial)})
     rows = []
     for title, way, repeats in _ways(predictor, trial, how, kinds, label=run.label):
-        numbers = []
-        for k in range(repeats):
 
-            def scored(k: int = k, title: str = title, way: Callable[[int], Way] | None = way) -> dict[str, float]:
-                run.progress(f"{title}: {len(trial.windows)} windows")
-                return trials.score(
-                    trial,
-                    way(how.seed + k) if way else None,
-                    samples=how.samples,
-                    root=predictor.layout.root or title in (ZERO, CONSTANT),
-                    say=lambda line: run.progress(f"{title}: {line}"),
-                )
+        def scored(k: int, title: str = title, way: Callable[[int], Way] | None = way) -> dict[str, float]:
+            run.progress(f"{title}: {len(trial.windows)} windows")
+            return trials.score(
+                trial,
+                way(how.seed + k) if way else None,
+                samples=how.samples,
+                root=predictor.layout.root or title in (ZERO, CONSTANT),
+                say=lambda line: run.progress(f"{title}: {line}"),
+            )
 
-            numbers.append(parts.once(f"{title} {k}", scored))
-        rows.append(row_of(title, numbers, COLUMNS))
+        rows.append(row_of(title, replicated(title, repeats, scored, parts, str), COLUMNS))
     others = _published(trial, how, [c.name for c in COLUMNS]) if with_published else ()
-    return Report(
-        "prediction",
-        "Prediction: many futures of what was seen",
-        run.command,
-        said,
-        COLUMNS,
-        (*rows, *others),
-        _notes(trial),
-    )
-
-
-def sampled(
-    predictor: Predictor,
-    seed: int,
-    *,
-    samples: int,
-    steps: int,
-    guidance: float = 1.0,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
-) -> Way:
-    """Our own way of predicting."""
-    return lambda past: futures(
-        predictor,
-        past,
-        count=samples,
-        seed=seed,
-        steps=steps,
-        guidance=guidance,
-        batch_size=trials.ROWS,
-        solver=solver,
-        spacing=spacing,
-    )
+    title = "Prediction: many futures of what was seen"
+    return run.report("prediction", title, said, (*rows, *others), _notes(trial))
 
 
 def as_published(predictor: Predictor, seed: int, *, samples: int, steps: int) -> Way:
@@ -180,13 +147,18 @@ def _ways(
 ) -> list[tuple[str, Callable[[int], Way] | None, int]]:
     """Name, the way of each seed (None: real futures), and how often it is measured."""
     frames, many = trial.protocol.future, how.published_steps
-    few, again = {"samples": how.samples, "guidance": how.guidance}, how.replications
+    again = how.replications
+    drawn = PredictionSampling(count=how.samples, guidance=how.guidance, batch_size=trials.ROWS)
+
+    def sampled(seed: int, steps: int) -> Way:
+        return partial(futures, predictor, sampling=replace(drawn, seed=seed, steps=steps))
+
     found: dict[str, tuple[str, Callable[[int], Way] | None, int]] = {
         "real": (REAL, None, 1),
         "zero": (ZERO, lambda seed: by_rule(metrics.zero_velocity, frames), 1),
         "constant": (CONSTANT, lambda seed: by_rule(metrics.constant_velocity, frames), 1),
-        "ours": (f"{label}, {how.steps} steps", lambda s: sampled(predictor, s, steps=how.steps, **few), again),
-        "ours-many": (f"{label}, {many} steps", lambda s: sampled(predictor, s, steps=many, **few), again),
+        "ours": (f"{label}, {how.steps} steps", lambda s: sampled(s, how.steps), again),
+        "ours-many": (f"{label}, {many} steps", lambda s: sampled(s, many), again),
         "published": (
             f"{label}, published sampler, {many} steps",
             lambda s: as_published(predictor, s, samples=how.samples, steps=many),

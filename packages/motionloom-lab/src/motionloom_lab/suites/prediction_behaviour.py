@@ -1,11 +1,12 @@
 """What a predictor does over long times, with parts held, and on the way to a target: studies of given weights.
 
-Every function takes a `Study`, whose protocol has a test part, and gives columns, rows and what to say of the settings;
+Every function takes a `Lab` and a predictor, and gives columns, rows and what to say of the settings;
 `prediction_studies` writes them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,24 +28,38 @@ from motionloom_lab.metrics.prediction_body import seam
 from motionloom_lab.report.report import REAL, Column, Row
 from motionloom_lab.report.tables import columns
 from motionloom_lab.suites import prediction_trial as trials
-from motionloom_lab.suites.harness import Say, plain_row, silent
+from motionloom_lab.suites.harness import plain_row
 from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, from_root
 from motionloom_train.data.prediction import Protocol
+from motionloom_train.data.progress import Say, silent
 
-Found = tuple[tuple[Column, ...], list[Row], dict[str, Any]]
+Found = tuple[Sequence[Column], list[Row], dict[str, Any]]
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
-    """What is studied, and how much of it."""
+@dataclass(frozen=True)
+class Budget:
+    """How much is measured."""
 
-    predictor: Predictor
-    protocol: Protocol
     windows: int
     samples: int
+    train_steps: int = 1000
     seed: int = 0
     seconds: float = 20.0
     """Of a long horizon."""
+    walks: tuple[int, ...] = (2, 3, 4, 5, 8, 10, 20, 50, 100)
+    """Sampling steps that are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lab:
+    """What a study works with."""
+
+    protocol: Protocol
+    """Its test part is measured."""
+    budget: Budget
+    keep: Path
+    """Where trained networks lie."""
+    device: str = "cpu"
     say: Say = silent
 
 
@@ -54,11 +69,11 @@ GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body
 TRANSITIONS = (0.5, 1.0, 2.0)
 
 
-def horizon(asked: Study) -> Found:
+def horizon(lab: Lab, predictor: Predictor) -> Found:
     """Futures that go on from themselves, second by second: do they freeze, do they drift."""
-    predictor, protocol, seconds = asked.predictor, asked.protocol, asked.seconds
-    trial = trials.prepare(protocol, count=asked.windows)
-    made = long_futures(predictor, trial, samples=asked.samples, seed=asked.seed, seconds=seconds, say=asked.say)
+    protocol, budget = lab.protocol, lab.budget
+    trial = trials.prepare(protocol, count=budget.windows)
+    made = long_futures(predictor, trial, budget, say=lab.say)
     known = _known_poses(protocol)
     real = np.stack([trial.future(k) for k in range(len(trial.windows))])
     rows = [plain_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
@@ -66,28 +81,23 @@ def horizon(asked: Study) -> Found:
     for start in range(0, made.shape[2] - second + 1, second):
         part = made[:, :, start : start + second]
         numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
-        spread = {"spread": _spread(part, protocol.layout)} if asked.samples > 1 else {}
+        spread = {"spread": _spread(part, protocol.layout)} if budget.samples > 1 else {}
         rows.append(plain_row(f"second {start // second + 1}", numbers | spread))
-    return (
-        columns("study-horizon"),
-        rows,
-        {"weights": predictor.card.name, "seconds": seconds, "training poses": len(known)},
-    )
+    said = {"weights": predictor.card.name, "seconds": budget.seconds, "training poses": len(known)}
+    return columns("study-horizon"), rows, said
 
 
-def long_futures(
-    predictor: Predictor, trial: PredictionTrial, *, samples: int, seed: int, seconds: float, say: Say = silent
-) -> Array:
+def long_futures(predictor: Predictor, trial: PredictionTrial, budget: Budget, say: Say = silent) -> Array:
     """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
     count, fps = len(trial.windows), predictor.fps
-    person = np.repeat(trial.pasts(0, count), samples, axis=0)
-    turns, made = int(np.ceil(seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
+    person = np.repeat(trial.pasts(0, count), budget.samples, axis=0)
+    turns, made = int(np.ceil(budget.seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
     sampler = WindowSampler(predictor, PredictionSampling())
-    for turn, new in enumerate(sampler.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
+    for turn, new in enumerate(sampler.windows(person, [(budget.seed, i) for i in range(len(person))], None, turns)):
         say(f"window {turn + 1} of {turns}")
         made.append(new)
-    whole = np.concatenate(made, axis=1)[:, : round(seconds * fps)]
-    return whole.reshape(count, samples, *whole.shape[1:])
+    whole = np.concatenate(made, axis=1)[:, : round(budget.seconds * fps)]
+    return whole.reshape(count, budget.samples, *whole.shape[1:])
 
 
 def _lively(motions: Array, protocol: Protocol, known: Array) -> dict[str, float]:
@@ -136,16 +146,16 @@ def _spread(motions: Array, layout: Layout) -> float:
     return float(np.mean(apart) / np.sqrt(poses.shape[-1] / 3)) if apart else 0.0
 
 
-def hold(asked: Study) -> Found:
+def hold(lab: Lab, predictor: Predictor) -> Found:
     """Each group of joints given in all of the future: how much nearer the others come, how they vary."""
-    _need_person(asked.predictor)
-    trial = trials.prepare(asked.protocol, count=asked.windows)
+    _need_person(predictor)
+    trial = trials.prepare(lab.protocol, count=lab.budget.windows)
     rows = []
     for group in GROUPS:
-        asked.say(f"hold {group}: {len(trial.windows)} windows")
-        numbers = held_numbers(asked.predictor, trial, group, samples=asked.samples, seed=asked.seed)
+        lab.say(f"hold {group}: {len(trial.windows)} windows")
+        numbers = held_numbers(predictor, trial, group, samples=lab.budget.samples, seed=lab.budget.seed)
         rows.append(plain_row(group, numbers))
-    return columns("study-hold"), rows, {"weights": asked.predictor.card.name, "given": "as in the real future"}
+    return columns("study-hold"), rows, {"weights": predictor.card.name, "given": "as in the real future"}
 
 
 def held_numbers(
@@ -196,11 +206,11 @@ def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, gr
     return float(np.minimum(np.abs(got - wanted).max(-1), np.abs(got + wanted).max(-1)).max())
 
 
-def arrive(asked: Study) -> Found:
+def arrive(lab: Lab, predictor: Predictor) -> Found:
     """The way from one recording to another, for transitions of several lengths."""
-    predictor, protocol = asked.predictor, asked.protocol
+    protocol, budget = lab.protocol, lab.budget
     _need_person(predictor)
-    trial = trials.prepare(protocol, count=asked.windows)
+    trial = trials.prepare(protocol, count=budget.windows)
     count = len(trial.windows)
     if count < 2:
         raise MotionloomError("a switch leads from one window to another; measure two or more")
@@ -218,12 +228,12 @@ def arrive(asked: Study) -> Found:
         cut.append(_seam(np.concatenate([p, q]), seen, predictor.fps, "start"))
     rows.append(plain_row("cut", _mean(cut)))
     for length in TRANSITIONS:
-        asked.say(f"switch in {length:g} s: {len(pairs)} pairs")
+        lab.say(f"switch in {length:g} s: {len(pairs)} pairs")
         found = []
         for a, b in pairs:
             past, target = clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b]))
-            for i in range(asked.samples):
-                found.append(switched(predictor, past, target, seconds=length, seed=asked.seed + i))
+            for i in range(budget.samples):
+                found.append(switched(predictor, past, target, seconds=length, seed=budget.seed + i))
         rows.append(plain_row(f"{length:g} s", _mean(found)))
     return columns("study-switch"), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
 
@@ -256,4 +266,4 @@ def _need_person(predictor: Predictor) -> None:
         raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
 
 
-STUDIES: dict[str, Callable[[Study], Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}
+STUDIES: dict[str, Callable[[Lab, Predictor], Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}

@@ -5,14 +5,16 @@ weights: steps, and those of `prediction_behaviour`. Each writes ``NAME.md``, ``
 folder. A network that is finished is found again there, one that was stopped goes on.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
-from motionloom.tasks.completion import SOLVER, SPACING, STEPS
+from motionloom.requests.sampling import PredictionSampling
+from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor, load_predictor
 from motionloom_lab.papers.benchmarks import find_protocol
 from motionloom_lab.report import files, plots, results
@@ -20,11 +22,10 @@ from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import REAL, Column, Report, Row, Value
 from motionloom_lab.suites import prediction, prediction_behaviour
 from motionloom_lab.suites import prediction_trial as trials
-from motionloom_lab.suites.harness import Run, Say, silent, weight_marks
-from motionloom_lab.suites.prediction_behaviour import Study
+from motionloom_lab.suites.harness import Run, weight_marks
+from motionloom_lab.suites.prediction_behaviour import Budget, Found, Lab
 from motionloom_lab.suites.prediction_trial import PredictionTrial
 from motionloom_lab.suites.protocol import check_ranges, reported
-from motionloom_train.data.prediction import Protocol
 from motionloom_train.loop import Training, changed
 from motionloom_train.predictor import train_predictor
 from motionloom_train.recipe import Recipe
@@ -51,35 +52,8 @@ TITLES = {
     "switch": "Arriving at another motion",
 }
 MOST = 1_000_000
-WALKS = (2, 3, 4, 5, 8, 10, 20, 50, 100)
 SPREADS = ("index", "early", "snr")
 SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
-
-
-@dataclass(frozen=True)
-class Budget:
-    """How much is measured."""
-
-    windows: int
-    samples: int
-    train_steps: int = 1000
-    seed: int = 0
-    seconds: float = 20.0
-    """Of a long horizon."""
-    walks: tuple[int, ...] = WALKS
-
-
-@dataclass(frozen=True, eq=False)
-class Lab:
-    """What a study works with."""
-
-    protocol: Protocol
-    budget: Budget
-    weights: Callable[[], Predictor]
-    keep: Path
-    """Where trained networks lie."""
-    device: str = "cpu"
-    progress: Say = silent
 
 
 def budget(name: str, *, quick: bool = False, changes: Mapping[str, int] | None = None) -> Budget:
@@ -119,31 +93,18 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
         read = trials.read_test(run.data, protocol, say=run.progress)
     if predictor is not None:
         trials.check_fit(predictor, read)
-    lab = Lab(
-        read,
-        budget,
-        lambda: predictor or Predictor.load(run.weights, device=run.device),
-        keep,
-        run.device,
-        run.progress,
-    )
-    found = replace(study(name, lab), command=run.command)
+    lab = Lab(read, budget, keep, run.device, run.progress)
+    found = replace(study(name, lab, predictor), command=run.command)
     if not trained:
         found = replace(found, protocol={**found.protocol, results.FILES: weight_marks([find_predictor(run.weights)])})
     write(found, name, run.folder)
     return found
 
 
-def study(name: str, lab: Lab) -> Report:
-    """The report of a study."""
-    if name in prediction_behaviour.STUDIES:
-        b = lab.budget
-        asked = Study(lab.weights(), lab.protocol, b.windows, b.samples, b.seed, b.seconds, lab.progress)
-        columns, rows, said = prediction_behaviour.STUDIES[name](asked)
-    elif name == "steps":
-        columns, rows, said = _steps(lab)
-    else:
-        columns, rows, said = _trained(name, lab)
+def study(name: str, lab: Lab, predictor: Predictor | None = None) -> Report:
+    """The report of a study; ``predictor``: the given weights, None where networks are trained."""
+    given = prediction_behaviour.STUDIES | {"steps": _steps}
+    columns, rows, said = _trained(name, lab) if predictor is None else given[name](lab, predictor)
     about = reported("study", {"data": lab.protocol, "budget": lab.budget}) | said
     return Report(f"study-{name}", TITLES[name], "", about, tuple(columns), tuple(rows))
 
@@ -167,10 +128,10 @@ def write(report: Report, name: str, folder: Path) -> None:
 # Networks that differ in one thing
 
 
-def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
+def _trained(name: str, lab: Lab) -> Found:
     setting, values = STUDIED[name]
     trial = trials.prepare(lab.protocol, count=lab.budget.windows)
-    rows = [_row(trial, REAL, trials.score(trial, None))]
+    rows = [_row(REAL, trials.score(trial, None))]
     for value in values:
         if setting == "kept" and value > lab.protocol.frames:
             continue
@@ -178,10 +139,9 @@ def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, An
         size = sum(values.size for values in predictor.net.weights.values())
         for steps in (10, 50) if name == "noising" else (STEPS,):
             label = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
-            lab.progress(f"{label}: {len(trial.windows)} windows")
-            way = prediction.sampled(predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps)
-            scored = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
-            rows.append(_row(trial, label, scored | {"parameters": size / 1e6}))
+            lab.say(f"{label}: {len(trial.windows)} windows")
+            scored = _scored(lab, trial, predictor, PredictionSampling(steps=steps))
+            rows.append(_row(label, scored | {"parameters": size / 1e6}))
     size = Column("parameters", "M parameters", "", "millions", 2)
     about = {
         "networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
@@ -219,7 +179,7 @@ def network(lab: Lab, setting: str, value: Any) -> Predictor:
         raise MotionloomError(f"{folder} holds a network of other settings; name another folder with --keep")
     place = folder / f"{name}.safetensors"
     if not place.is_file() or load_predictor(place).card.notes.get("steps") != steps:
-        said = lambda line: lab.progress(f"{name}: {line}")  # noqa: E731
+        said = lambda line: lab.say(f"{name}: {line}")  # noqa: E731
         train_predictor(Training(recipe, folder, lab.device, say=said), lab.protocol)
     return load_predictor(place).to(lab.device)
 
@@ -227,23 +187,21 @@ def network(lab: Lab, setting: str, value: Any) -> Predictor:
 # Given weights
 
 
-def _steps(lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
-    trial, predictor = trials.prepare(lab.protocol, count=lab.budget.windows), lab.weights()
+def _steps(lab: Lab, predictor: Predictor) -> Found:
+    trial = trials.prepare(lab.protocol, count=lab.budget.windows)
     walks = [n for n in lab.budget.walks if n < predictor.schedule.steps]
-    rows = [_row(trial, REAL, trials.score(trial, None))]
+    rows = [_row(REAL, trials.score(trial, None))]
     for solver in ("ddim", "dpm2m"):
         for spacing in SPREADS:
             found: dict[int, dict[str, float]] = {}
             for steps in reversed(walks):
-                lab.progress(f"{solver}, {spacing}, {steps} steps")
-                way = prediction.sampled(
-                    predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps, solver=solver, spacing=spacing
-                )
-                found[steps] = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
+                lab.say(f"{solver}, {spacing}, {steps} steps")
+                how = PredictionSampling(steps=steps, solver=solver, spacing=spacing)
+                found[steps] = _scored(lab, trial, predictor, how)
             most = found[max(walks)]
             for steps in walks:
                 ratios = {f"{k}_ratio": found[steps][k] / most[k] for k in ("ade", "fde", "jerk") if most[k] > 0}
-                rows.append(_row(trial, f"{solver}, {spacing}, {steps} steps", found[steps] | ratios))
+                rows.append(_row(f"{solver}, {spacing}, {steps} steps", found[steps] | ratios))
     said = f"over {max(walks)} steps of the same solver and spacing"
     ratios = [
         Column(f"{k}_ratio", f"{k.upper() if k != 'jerk' else k} ratio", "", said) for k in ("ade", "fde", "jerk")
@@ -251,9 +209,15 @@ def _steps(lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
     return [*_columns(SHOWN), *ratios], rows, {"weights": predictor.card.name}
 
 
+def _scored(lab: Lab, trial: PredictionTrial, predictor: Predictor, how: PredictionSampling) -> dict[str, float]:
+    samples = lab.budget.samples
+    how = replace(how, count=samples, seed=lab.budget.seed, guidance=1.0, batch_size=trials.ROWS)
+    return trials.score(trial, partial(futures, predictor, sampling=how), samples=samples, say=lab.say)
+
+
 def _columns(names: Sequence[str]) -> list[Column]:
     return [c for c in prediction.COLUMNS if c.name in names]
 
 
-def _row(trial: PredictionTrial, name: str, numbers: dict[str, float]) -> Row:
+def _row(name: str, numbers: dict[str, float]) -> Row:
     return Row(name, {key: Value(value) for key, value in numbers.items() if key in SHOWN or key not in trials.KNOWN})

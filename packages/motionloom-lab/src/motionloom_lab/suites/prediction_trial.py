@@ -22,6 +22,7 @@ from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.papers.benchmarks import find_protocol
 from motionloom_train.data.clips import read_clip
 from motionloom_train.data.prediction import CMU_TEST, Protocol, Recording, checked
+from motionloom_train.data.progress import Say, silent
 
 Array = NDArray[np.float64]
 Way = Callable[[Array], Array]
@@ -86,7 +87,7 @@ class PredictionTrial:
         return recording.positions[start + first : start + last].astype(np.float64)
 
 
-def read_test(data: Path | str, name: str | None = None, *, say: Callable[[str], None] = lambda line: None) -> Protocol:
+def read_test(data: Path | str, name: str | None = None, *, say: Say = silent) -> Protocol:
     """The test part of a data set (`find_protocol`), or of the CMU clips in a built set, which are at 20 fps."""
     clips = Path(data) / "clips"
     if name not in (None, "cmu") or not clips.is_dir():
@@ -125,14 +126,10 @@ def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Si
     trial = PredictionTrial(
         protocol, tuple(every[k] for k in chosen), every, tuple(near[k] for k in chosen), limbs, singles, {}
     )
-    return replace(trial, speeds=_speeds(trial) | protocol.speeds)
-
-
-def _speeds(trial: PredictionTrial) -> dict[str, float]:
     tally = metrics.CmdTally()
     for number, (recording, _) in enumerate(trial.windows):
         tally.add(recording.action, from_root(trial.future(number))[None])
-    return tally.speeds()
+    return replace(trial, speeds=tally.speeds() | protocol.speeds)
 
 
 def from_root(positions: np.ndarray) -> Array:
@@ -161,7 +158,7 @@ def score(
     samples: int = 1,
     chunk: int | None = None,
     root: bool = True,
-    say: Callable[[str], None] = lambda line: None,
+    say: Say = silent,
 ) -> dict[str, float]:
     """Numbers by name: those of `metrics.METRICS`, ``cmd``, ``root_ade``, ``root_fde`` and ``seconds`` per past.
 
@@ -176,7 +173,8 @@ def score(
             from_root(made), from_root(truth), near, fps=trial.protocol.fps, past=from_root(past), limbs=trial.limbs
         )
         tally.add(scores, trial.windows[number][0].action)
-        ways.append(_way_errors(made, truth))
+        off = np.linalg.norm(made[:, :, 0] - truth[None, :, 0], axis=-1)
+        ways.append((off.mean(axis=1).min(), off[:, -1].min()))  # ADE and FDE of the root's way
         seconds += took
         if way is None and len(near) > 1:
             variety.append(metrics.apd(near))
@@ -189,9 +187,7 @@ def score(
     return found | {"seconds": seconds / len(trial.windows)}
 
 
-def _predicted(
-    trial: PredictionTrial, way: Way | None, chunk: int, say: Callable[[str], None]
-) -> Iterator[tuple[int, Array, float]]:
+def _predicted(trial: PredictionTrial, way: Way | None, chunk: int, say: Say) -> Iterator[tuple[int, Array, float]]:
     """Number of each window, its futures (samples, frames, joints, 3), and the seconds that they took."""
     reported = time.perf_counter()
     for first in range(0, len(trial.windows), chunk):
@@ -208,9 +204,3 @@ def _predicted(
         if time.perf_counter() - reported > EVERY:
             reported = time.perf_counter()
             say(f"window {last} of {len(trial.windows)}")
-
-
-def _way_errors(made: Array, truth: Array) -> tuple[float, float]:
-    """ADE and FDE of the root's way: metres."""
-    errors = np.linalg.norm(made[:, :, 0] - truth[None, :, 0], axis=-1)
-    return float(errors.mean(axis=1).min()), float(errors[:, -1].min())

@@ -22,6 +22,7 @@ from motionloom_lab.evaluator.evaluators import Evaluator
 from motionloom_lab.metrics.transitions import JERK_HUMANML3D, area_under_jerk, jerk_curve, mean_jerk, peak_jerk
 from motionloom_lab.suites.harness import embedded, physical_mean
 from motionloom_lab.suites.protocol import Transitions
+from motionloom_train.data.paths import DAMAGED
 
 FORMAT = 1
 LARGEST_FILE = 1 << 20
@@ -158,7 +159,7 @@ def load_shipped(path: Path | None = None) -> Shipped | None:
             int(count): {name: _number(numbers[name]) for name in NAMES} for count, numbers in found["jerks"].items()
         }
         return Shipped(int(found["window"]), _number(found["mean_jerk"]), seams, by_count)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except DAMAGED as error:
         raise MotionloomError(f"{path} holds no numbers of real transitions ({error!r}); make it again") from None
 
 

@@ -10,9 +10,8 @@ from motionloom.kinematics.physics import Array
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import CHECKS
 from motionloom_lab.metrics.realism import NUMBERS, average, compare, speed_distance
-from motionloom_lab.suites.clips import RealClip
-from motionloom_lab.suites.generator import generator
-from motionloom_lab.suites.harness import Generate, Run
+from motionloom_lab.suites.harness import Generate, Run, generator
+from motionloom_lab.suites.items import RealClip
 
 SHORTEST, LONGEST = 2.0, 9.8
 """Seconds of the real stretches that are compared with."""

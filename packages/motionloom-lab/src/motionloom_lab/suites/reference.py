@@ -4,7 +4,7 @@
 so that tables can show them where no recordings are at hand. `motionloom evaluate reference` makes it anew.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from motionloom.features.layout import FPS
@@ -12,7 +12,8 @@ from motionloom.reading import read_table
 from motionloom_lab.metrics.actions import Measures, measure
 from motionloom_lab.metrics.obedience import CHECKS, Check
 from motionloom_lab.metrics.realism import average
-from motionloom_lab.suites.clips import RealClip
+from motionloom_lab.suites.items import RealClip
+from motionloom_train.data.progress import Say, silent
 
 
 def known() -> dict[str, Any]:
@@ -20,7 +21,7 @@ def known() -> dict[str, Any]:
     return read_table("motionloom_lab.suites", "reference.json")
 
 
-def reference(clips: Iterable[RealClip], progress: Callable[[str], None] = lambda line: None) -> dict[str, Any]:
+def reference(clips: Iterable[RealClip], progress: Say = silent) -> dict[str, Any]:
     """All numbers for a set of real clips, as plain data."""
     kept = list(clips)
     progress(f"{len(kept)} real clips")

@@ -13,8 +13,9 @@ from motionloom.errors import MotionloomError
 from motionloom.reading import read_table
 from motionloom.weights.prior import Prior, find_weights, shipped
 from motionloom_lab.report.report import Report
-from motionloom_lab.suites import measures, needs
-from motionloom_lab.suites.harness import Generate, Run, Say, evaluator_file, silent
+from motionloom_lab.suites import items, measures
+from motionloom_lab.suites.harness import Generate, Run, evaluator_file
+from motionloom_train.data.progress import Say, silent
 
 HERE = Path(__file__).parent
 Asked = Mapping[str, Any]
@@ -82,7 +83,7 @@ class Suite:
     files: Callable[[Job], Sequence[Path]] = lambda job: ()
     """Further files whose content changes the numbers, the weights under test aside."""
     needs: Callable[[Path], None] = lambda data: None
-    """Raises `needs.NoData` where the data have nothing of the kind it measures."""
+    """Raises `items.NoData` where the data have nothing of the kind it measures."""
     prior: bool = True
     """Whether the job's weights are measured; else only `files` are."""
     judged: bool = False
@@ -138,7 +139,7 @@ def _suite(name: str, row: Asked) -> Suite:
         row["quick"],
         row.get("data", ""),
         _files(files),
-        getattr(needs, f"need_{kind}") if kind else lambda data: None,
+        getattr(items, f"need_{kind}") if kind else lambda data: None,
         row.get("prior", True),
         "judge" in files and name != "evaluator",
     )

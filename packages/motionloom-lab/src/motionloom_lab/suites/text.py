@@ -20,14 +20,13 @@ from motionloom.kinematics.physics import Array
 from motionloom.tasks.text import sample_features
 from motionloom.weights.prior import Prior
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
-from motionloom_lab.metrics.frechet import fid, fid_bias
-from motionloom_lab.metrics.retrieval import matching_distance, multimodality_of, r_precision
-from motionloom_lab.report import published_rows
+from motionloom_lab.metrics.retrieval import fid, fid_bias, matching_distance, multimodality_of, r_precision
 from motionloom_lab.report.report import REAL, Report, Row, Value
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import text_reference
 from motionloom_lab.suites.harness import (
     PHYSICAL,
+    Parts,
     Run,
     averaged,
     diversity,
@@ -38,9 +37,9 @@ from motionloom_lab.suites.harness import (
     row_of,
 )
 from motionloom_lab.suites.items import fitting, pick, read_items, spread
-from motionloom_lab.suites.parts import Parts
 from motionloom_lab.suites.protocol import Protocol, Selection
 from motionloom_lab.suites.text_reference import TextReference
+from motionloom_train.data.progress import Say
 
 MULTIMODAL_PAIRS = 10
 CHANCE_ROWS = 500
@@ -243,9 +242,7 @@ def measure(
         rows.append(Row(f"{run.label}, {steps} steps", values))
     selection, data, judge = trial.real.selection, trial.real.data, trial.evaluator.name
     described = protocol.described(selection, data=data, items=len(trial.texts), evaluator=judge)
-    others = published_rows.published("text", [column.name for column in COLUMNS])
-    title = f"Text to motion: {run.label}"
-    return Report("text", title, run.command, described, COLUMNS, (*rows, *others), _notes(trial))
+    return run.report("text", f"Text to motion: {run.label}", described, rows, _notes(trial), beside="text")
 
 
 def _notes(trial: TextTrial) -> tuple[str, ...]:
@@ -255,12 +252,9 @@ def _notes(trial: TextTrial) -> tuple[str, ...]:
     said = [plain_words(caption.text) for several in real.captions for caption in several]
     numbers = {"captions": len(said), "repeated": len(said) - len(set(said)), "width": real.motions.shape[1]}
     found = notes("text", dict(count=count, half=half, bias=bias, **numbers))
-    return (*found, *_about(trial.evaluator), *notes("cost"))
-
-
-def _about(evaluator: Evaluator) -> tuple[str, ...]:
-    said = "; ".join(f"{name}: {text}" for name, text in evaluator.about.items())
-    return (f"Evaluator {evaluator.name}. {said}",) if said else ()
+    about = "; ".join(f"{name}: {text}" for name, text in trial.evaluator.about.items())
+    judge = (f"Evaluator {trial.evaluator.name}. {about}",) if about else ()
+    return (*found, *judge, *notes("cost"))
 
 
 def run(
@@ -288,9 +282,7 @@ def run(
     return measure(trial, run, parts=parts, memory=memory)
 
 
-def reference(
-    judge: Evaluator, data: Path | str | None, selection: Selection | None, progress: Callable[[str], None]
-) -> TextReference:
+def reference(judge: Evaluator, data: Path | str | None, selection: Selection | None, progress: Say) -> TextReference:
     """Real motions: those of ``data``, or the shipped numbers, which nobody can select from."""
     if data is not None:
         selection = fitting(data, selection)

@@ -5,14 +5,14 @@ embeddings (no motion), captions, lengths and physical numbers of held-out recor
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
@@ -25,6 +25,8 @@ from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.suites.harness import CHUNK, PHYSICAL, physical
 from motionloom_lab.suites.items import Item, spread
 from motionloom_lab.suites.protocol import MOST_ITEMS, RECORDED, Protocol, Selection
+from motionloom_train.data.paths import DAMAGED
+from motionloom_train.data.progress import Say, silent
 
 FORMAT = 1
 LARGEST_FILE = 64 << 20
@@ -79,9 +81,7 @@ class TextReference:
         return f"{' + '.join(self.selection.splits)} of {sources}, captions that people wrote"
 
 
-def measure(
-    items: Sequence[Item], evaluator: Evaluator, selection: Selection, progress: Callable[[str], None] = lambda _: None
-) -> TextReference:
+def measure(items: Sequence[Item], evaluator: Evaluator, selection: Selection, progress: Say = silent) -> TextReference:
     """Embed and measure the items of `items.read_items`."""
     motions, physicals = [], []
     for start in range(0, len(items), CHUNK):
@@ -175,7 +175,7 @@ def load(path: Path | str, evaluator: Evaluator) -> TextReference:
                 raise ValueError("its tensors have other names")
             found = {name: file.get_tensor(name) for name in _KINDS}
         reference = _decoded(about, found)
-    except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except DAMAGED as error:
         reason = " ".join(str(error).split())[:160]
         raise MotionloomError(f"{path} is not a reference of real motions ({reason}); make it again") from None
     if not made_by(reference, evaluator):

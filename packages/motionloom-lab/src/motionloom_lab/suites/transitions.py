@@ -16,8 +16,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.kinematics.physics import Array
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
-from motionloom_lab.metrics.frechet import fid, fid_bias
-from motionloom_lab.metrics.retrieval import matching_distance, r_precision
+from motionloom_lab.metrics.retrieval import fid, fid_bias, matching_distance, r_precision
 from motionloom_lab.metrics.transitions import (
     JERK_HUMANML3D,
     area_under_jerk,
@@ -25,18 +24,17 @@ from motionloom_lab.metrics.transitions import (
     sequence_jerk,
     transition_distance,
 )
-from motionloom_lab.report import published_rows
 from motionloom_lab.report.report import REAL, Report
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import harness, text_reference
-from motionloom_lab.suites.harness import Run, Say, diversity, embedded, replicated, row_of
+from motionloom_lab.suites.harness import Parts, Run, diversity, embedded, replicated, row_of
 from motionloom_lab.suites.items import fitting, read_items
 from motionloom_lab.suites.long_baselines import Long, Method, methods, titled
-from motionloom_lab.suites.parts import Parts
 from motionloom_lab.suites.protocol import Selection, Transitions
 from motionloom_lab.suites.real_seams import PHYSICAL, SeamCrops, Shipped, averaged, jerks, load_shipped
 from motionloom_lab.suites.text import identity
 from motionloom_lab.suites.text_reference import TextReference
+from motionloom_train.data.progress import Say
 
 LEAST_INSIDE = 8
 """Frames: what is left of a segment between its transitions is measured from so many on."""
@@ -217,9 +215,8 @@ def measure(
         "representation": "HumanML3D at 20 frames per second, positions as the network draws them (not finished)",
         **how.described(),
     }
-    others = published_rows.published("long", [column.name for column in COLUMNS])
     title = f"Long motion and its transitions: {run.label}"
-    return Report("transitions", title, run.command, said, COLUMNS, (*rows, *others), _notes(trial))
+    return run.report("transitions", title, said, rows, _notes(trial), beside="long")
 
 
 def _notes(trial: SeamTrial) -> tuple[str, ...]:

@@ -1,13 +1,13 @@
 """The everyday checks tried on real people: clips that show the action should pass, all others should fail.
 
-Which clips show what is found by their names and captions (`lab.suites.trial_clips`). A few actions were never
+Which clips show what is found by their names and captions (``trial_clips.toml``). A few actions were never
 recorded on their own; for those, examples are made of real clips: a part of a clip, one played backwards, or two
 joined. Clips that show something so close that either answer is right count neither way. Simple deceivers are tried
 beside them: somebody who stands there and somebody who walks ahead.
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -17,10 +17,12 @@ from motionloom.blending import crossfade, shares
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_table
 from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.everyday.body import Body
 from motionloom_lab.metrics.obedience import Check
-from motionloom_lab.suites.clips import RealClip
+from motionloom_lab.suites.items import RealClip
+from motionloom_train.data.progress import Say, silent
 
 NOTHING = r"(?!)"
 LONGEST = round(10 * FPS)
@@ -206,7 +208,7 @@ def tried(
     trials: Mapping[str, Examples],
     clips: Sequence[RealClip],
     *,
-    progress: Callable[[str], None] = lambda line: None,
+    progress: Say = silent,
 ) -> dict[str, CheckTally]:
     """Every check on all clips.
 
@@ -227,9 +229,8 @@ def tried(
             passed, count = getattr(tally, kind)
             setattr(tally, kind, (passed + ok, count + 1))
             if not ok and kind != "opposite":
-                tally.missed.append(
-                    f"{name}: {', '.join(_measured_text(b.measure, numbers) for b in check.failed(numbers))}"
-                )
+                broken = (f"{bound.measure} {numbers[bound.measure]:g}" for bound in check.failed(numbers))
+                tally.missed.append(f"{name}: {', '.join(broken)}")
             if ok and kind == "opposite":
                 tally.slipped.append(f"{name} (the other side)")
         wrong = [(c, check.obeyed(check.of(bodies[id(c)]))) for c in others(trial, clips)]
@@ -240,10 +241,6 @@ def tried(
         tally.walks = walks is not None and check.obeyed(check.measured(walks, FPS))
         progress(f"{check.name}: {tally.shown} shown, {tally.made} made, {tally.others} others")
     return found
-
-
-def _measured_text(name: str, numbers: Mapping[str, float]) -> str:
-    return f"{name} {numbers[name]:g}"
 
 
 def table(found: Mapping[str, CheckTally]) -> list[list[str]]:
@@ -267,3 +264,23 @@ def summary(found: Mapping[str, CheckTally]) -> dict[str, Any]:
         }
         for name, tally in found.items()
     }
+
+
+def trials() -> dict[str, Examples]:
+    """How to find examples, by the name of the check."""
+    found = read_table("motionloom_lab.suites", "trial_clips.toml")
+    words = {f"@{name}": "|".join(items) for name, items in found.pop("words").items()}
+    return {name: _trial(entry, words) for name, entry in found.items()}
+
+
+def _trial(entry: dict[str, Any], words: dict[str, str]) -> Examples:
+    def pattern(items: list[str]) -> str:
+        return "|".join(words.get(item, item) for item in items) or NOTHING
+
+    cut = entry.get("cut")
+    return Examples(
+        **{name: pattern(entry.get(name, [])) for name in ("shows", "unless", "like", "backwards")},
+        sided=entry.get("sided", False),
+        cut=None if cut is None else (cut[0], cut[1]),
+        joined=tuple(pattern(item.split(" or ")) for item in entry.get("joined", [])),
+    )

@@ -66,7 +66,7 @@ def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "t
     """The clips, and what is wrong with each."""
     from motionloom.io import load
     from motionloom.retarget.upright import stood_up
-    from motionloom_train.data.clip_check import check_file
+    from motionloom_train.data.examples import check_file
 
     motions, findings = [], []
     for one in captioned:
@@ -119,7 +119,7 @@ def _teach(
 ) -> None:
     from motionloom.weights.prior import Prior
     from motionloom_train.teach import Lesson, teach
-    from motionloom_train.threads import set_threads
+    from motionloom_train.tensors import set_threads
 
     if arguments.threads is not None:
         if arguments.threads < 1:

@@ -54,7 +54,7 @@ def _training(arguments: argparse.Namespace) -> "Training":
     """The run of the recipe with its changes; checks and applies what is said about it."""
     from motionloom_train.loop import Training
     from motionloom_train.recipe import changes, load_recipe
-    from motionloom_train.threads import set_threads
+    from motionloom_train.tensors import set_threads
 
     for option in ("threads", "stop"):
         if getattr(arguments, option) is not None and getattr(arguments, option) < 1:

@@ -31,6 +31,7 @@ from motionloom.io.atomic import atomic_path, finished, sweep
 from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment, gate
 from motionloom_train.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to
+from motionloom_train.data.augment import find_idle
 from motionloom_train.data.clips import SHORTEST, Clip, Note, read_clip, write_clip
 from motionloom_train.data.derived import (
     LOOPED,
@@ -45,9 +46,9 @@ from motionloom_train.data.derived import (
     sat_and_risen,
     there_and_back,
 )
-from motionloom_train.data.idle import find_idle
 from motionloom_train.data.made import hands_up
 from motionloom_train.data.person import uniform_person
+from motionloom_train.data.progress import Say
 from motionloom_train.data.sources import Places, Span, Take, find_takes
 from motionloom_train.data.windows import label_clip
 from motionloom_train.data.words import STATES, mirror_text
@@ -252,7 +253,7 @@ def build(
     exclude: Sequence[str] = (),
     allow: Mapping[str, str] = MappingProxyType({}),
     find: Finder = find_takes,
-    progress: Callable[[str], None] = print,
+    progress: Say = print,
 ) -> Path:
     """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept.
 
@@ -318,7 +319,7 @@ def _jobs(
     out: Path,
     *,
     find: Finder,
-    progress: Callable[[str], None],
+    progress: Say,
 ) -> Iterator[Job]:
     seen: dict[str, str] = {}
     for folder in folders:
@@ -364,7 +365,7 @@ def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:
         ) from None
 
 
-def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
+def _finish(out: Path, mixed: int, progress: Say) -> Path:
     clips = [read_clip(path) for path in finished(out / "clips", "*.safetensors") if not _DERIVED.match(path.stem)]
     for clip in _derived(list(clips), mixed):
         write_clip(out / "clips", clip)

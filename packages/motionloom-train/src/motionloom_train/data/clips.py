@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import decode_positions
@@ -14,6 +14,7 @@ from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.actions import PREFIX
+from motionloom_train.data.paths import DAMAGED
 from motionloom_train.data.words import LABELS, check_caption
 
 MAX_BYTES = 256 << 20
@@ -85,7 +86,7 @@ def read_clip(path: Path) -> Clip:
         clip = Clip(**about, notes=notes, features=features)
         _check_clip(clip)
         return clip
-    except (SafetensorError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except DAMAGED as error:
         raise MotionloomError(
             f"{path} is not a clip of a built set ({error}); delete it and its name in done/, and build again"
         ) from error

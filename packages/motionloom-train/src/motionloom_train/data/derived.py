@@ -11,11 +11,11 @@ from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment
 from motionloom_train.data.actions import ACTIONS, PREFIX, Action, sentences, side_of, turned_to
+from motionloom_train.data.augment import Idle
 from motionloom_train.data.clips import MADE, SHORTEST, THEN, Clip, Note
-from motionloom_train.data.idle import Idle
 from motionloom_train.data.made import GESTURES, Gesture, hands_up, lower_arms, perform, words_for
 from motionloom_train.data.person import at_origin
-from motionloom_train.data.postures import Posture, assume, postures
+from motionloom_train.data.postures import assume, postures
 from motionloom_train.data.words import POSTURES, sentence
 
 LOOPED = 200
@@ -119,17 +119,12 @@ def _derived(clip: Clip, features: np.ndarray, way: str, notes: tuple[Note, ...]
 
 def laid_down(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """From standing to lying, out of a crouch and of lying down from one, and the same film backwards: getting up."""
-    parts = {
-        name: [
-            (c, n)
-            for c in clips
-            for n in c.notes
-            if n.kind == PREFIX + name and c.way == "plain" and c.split == "train"
-        ]
-        for name in ("crouch", "crouch to lie")
-    }
+    pool = _by_action(clips)
+    crouches, lies = (
+        [one for one in pool.get(name, ()) if one[0].way == "plain"] for name in ("crouch", "crouch to lie")
+    )
     rng, made = np.random.default_rng(seed), 0
-    pairs = [(a, b) for a in parts["crouch"] for b in parts["crouch to lie"]]
+    pairs = [(a, b) for a in crouches for b in lies]
     for number in rng.permutation(len(pairs)):
         if made >= count:
             return
@@ -362,22 +357,18 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
         for kind, posture in enumerate(postures(body, rng)):
             begin = float(rng.uniform(0.8, 1.0))
             frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
-            features = hml.encode(at_origin(_assumed(body[:frames], posture, begin, rng)), heading="corrected")
+            shown = assume(body[:frames], posture, fps=FPS, begin=begin)
+            if posture.arms_out:
+                shown = perform(shown, GESTURES["arms out"], "", fps=FPS, begin=begin, rng=rng)
+            features = hml.encode(at_origin(shown), heading="corrected")
             action = ACTIONS[posture.action]
             texts = sentences(action, side=posture.side)
-            shown = 2.0 if action.kind == "cycle" else posture.seconds(kept=0.5)
-            start, end = round(FPS * begin), min(round(FPS * (begin + shown)), len(features))
+            lasts = 2.0 if action.kind == "cycle" else posture.seconds(kept=0.5)
+            start, end = round(FPS * begin), min(round(FPS * (begin + lasts)), len(features))
             whole = None if action.kind == "repeats" else (start, end)
             notes = (Note(0, len(features), PREFIX + action.name, texts, whole),)
             name = f"posture_{seed}_{number:03d}{kind}"
             yield Clip(name, below.source, below.licence, "train", "made", notes, features.astype(np.float32), "made")
-
-
-def _assumed(body: Array, posture: Posture, begin: float, rng: np.random.Generator) -> Array:
-    shown = assume(body, posture, fps=FPS, begin=begin)
-    if not posture.arms_out:
-        return shown
-    return perform(shown, GESTURES["arms out"], "", fps=FPS, begin=begin, rng=rng)
 
 
 def _stands_plainly(clip: Clip, note: Note) -> bool:

@@ -1,11 +1,12 @@
-"""A user's own few clips with their captions, as examples that an adapter learns from (`motionloom_train.teach`).
+"""A user's own few clips with their captions, as examples that an adapter learns from (`motionloom_train.teach`), and
+what is wrong with one: too short, floating, wrong unit, nothing moves.
 
 A clip of any skeleton that the readers know becomes features of the uniform person. Clips shorter than what will be
 asked for are lengthened: a gait goes on as a loop, anything else is held at both ends.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +16,12 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
 from motionloom.formats import readable
+from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom.motion import Motion
 from motionloom.reading import read_bytes
-from motionloom.retarget import to_smpl22
+from motionloom.retarget import joints22, to_smpl22
+from motionloom.retarget.anatomy import read_body
 from motionloom_train.data import augment
 from motionloom_train.data.person import uniform_person
 from motionloom_train.data.words import mirror_text
@@ -180,3 +183,100 @@ def _goes_on(positions: Array) -> bool:
     way = np.linalg.norm(np.diff(positions[:, 0][:, [0, 2]], axis=0), axis=-1) * FPS
     third = max(1, len(way) // 3)
     return bool(min(way[:third].mean(), way[-third:].mean()) > 0.25)
+
+
+SHORTEST = 0.7
+"""Seconds of the shortest clip that shows an action."""
+LEGS = (0.4, 1.4)
+"""Metres of thigh and shin: children to giants."""
+FACTORS = (0.01, 0.001, 0.1, 0.0254, 100.0, 1000.0, 10.0, 39.37)
+"""By which a unit is commonly wrong."""
+STILL = 0.06
+"""Metres: if no joint ever gets further from where it was than this, nothing happens."""
+OVER_FLOOR, SHARE_IN_AIR = 0.12, 0.4
+"""Metres over the lowest point of the clip, and the share of frames, beyond which somebody floats."""
+FAR_FROM_FLOOR = 0.25
+"""Metres between the lowest point of a clip and y = 0 that are worth a word."""
+LEAP = 15.0
+"""Metres per second of the pelvis: faster than anybody runs."""
+SLIDES = 0.35
+"""`FootSkate.ratio` beyond which feet slide: recorded walks have less than a tenth."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong with a clip."""
+
+    sentence: str
+    fatal: bool
+    """True where nothing sensible can be learned; else it is a thing to look at."""
+
+
+def check_clip(motion: Motion) -> list[Finding]:
+    """What is wrong with a clip, the fatal first; empty for a good one.
+
+    motion: as read, in metres. Sizes and places are judged on the clip's own joints, movement on the uniform person.
+    Raises `MotionloomError` for a skeleton that is no person's.
+    """
+    leg = read_body(motion.skeleton).leg
+    own = joints22(motion)
+    found = [*_of_size(leg, motion.seconds)]
+    if not found:
+        found = [*_of_movement(uniform_positions(motion), own / max(leg, 1e-9) * 0.85, motion.fps), *_of_floor(own)]
+    return sorted(found, key=lambda one: not one.fatal)
+
+
+def check_file(motion_or_error: Motion | MotionloomError) -> list[Finding]:
+    """`check_clip` of what a reader gave; what could not be read is a finding too."""
+    if isinstance(motion_or_error, MotionloomError):
+        return [Finding(str(motion_or_error), fatal=True)]
+    try:
+        return check_clip(motion_or_error)
+    except MotionloomError as error:
+        return [Finding(str(error), fatal=True)]
+
+
+def _of_size(leg: float, seconds: float) -> Iterator[Finding]:
+    """Unit and length, without which nothing else can be judged."""
+    if not LEGS[0] <= leg <= LEGS[1]:
+        near = next((factor for factor in FACTORS if LEGS[0] <= leg * factor <= LEGS[1]), None)
+        advice = (
+            "" if near is None else f"; in a unit {near:g} times as large they would be {leg * near:.2f} m (--unit)"
+        )
+        yield Finding(f"its legs are {leg:.3g} m long, so the unit of length is wrong{advice}", fatal=True)
+    if seconds < SHORTEST:
+        yield Finding(f"it is {seconds:.2f} s short; at least {SHORTEST:g} s show an action", fatal=True)
+
+
+def _of_movement(uniform: Array, own: Array, fps: float) -> Iterator[Finding]:
+    """uniform: joints of the uniform person; own: those of the clip on legs of the person's length."""
+    if np.linalg.norm(uniform - np.median(uniform, axis=0), axis=-1).max() < STILL:
+        yield Finding(f"nothing moves: no joint gets {100 * STILL:.0f} cm away from its place", fatal=True)
+    speed = np.linalg.norm(np.diff(own[:, 0], axis=0), axis=-1) * fps
+    if len(speed) and speed.max() > LEAP:
+        leap, second = speed.max() / fps, int(speed.argmax()) / fps
+        said = f"the body leaps {leap:.2f} m from one frame to the next at {second:.2f} s; cut the clip there"
+        yield Finding(said, fatal=True)
+    trunk = uniform[:, 12] - uniform[:, 0]
+    rise = trunk[:, 1] / np.maximum(np.linalg.norm(trunk, axis=-1), 1e-9)
+    if np.percentile(rise, 90) <= 0.3:
+        said = "the body lies or hangs all the time; if it should stand, the file has another axis up (--up z)"
+        yield Finding(said, fatal=False)
+    lowest = uniform[..., 1].min(axis=1)
+    share = float((lowest - np.percentile(lowest, 1) > OVER_FLOOR).mean())
+    if share > SHARE_IN_AIR:
+        said = f"it floats: for {100 * share:.0f} % of the time no part of the body is within {100 * OVER_FLOOR:.0f} cm"
+        said += " of the floor; the floor is not level, or what is climbed on is missing"
+        yield Finding(said, fatal=False)
+    skate = ph.foot_skate(uniform, FPS, floor=ph.floor_height(uniform))
+    if skate.ratio > SLIDES:
+        often = f"{100 * skate.ratio:.0f} % of the frames"
+        said = f"feet slide on the floor in {often}, and that is learned too; lock them first"
+        yield Finding(said, fatal=False)
+
+
+def _of_floor(own: Array) -> Iterator[Finding]:
+    height = float(np.percentile(own[..., 1].min(axis=1), 2))
+    if abs(height) > FAR_FROM_FLOOR:
+        where = "above" if height > 0 else "below"
+        yield Finding(f"its floor is {abs(height):.2f} m {where} y = 0; it is put onto the floor", fatal=False)

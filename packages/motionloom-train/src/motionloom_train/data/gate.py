@@ -18,6 +18,7 @@ from motionloom.io.atomic import atomic_path, finished
 from motionloom.io.text import plain_json
 from motionloom.retarget.fidelity import Fidelity, Spread, compare
 from motionloom_train.data.clips import Clip
+from motionloom_train.data.paths import DAMAGED
 from motionloom_train.data.sources import Places
 
 FOLDER = "fidelity"
@@ -100,7 +101,7 @@ def _read(path: Path) -> Compared:
             faults=tuple(map(str, about["faults"])),
             allowed=str(about["allowed"]),
         )
-    except (OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except DAMAGED as error:
         raise MotionloomError(
             f"{path} does not hold a clip's figures ({error}); delete it and its name in done/, and build again"
         ) from None

@@ -1,6 +1,6 @@
 """A page of pictures to look over a built set: recordings beside the clips that were made of them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from motionloom.viz.film import caption, font, shorten, suffixed
 from motionloom_train.data import gate
 from motionloom_train.data.build import Finder, clips_of
 from motionloom_train.data.clips import read_clip
+from motionloom_train.data.progress import Say
 from motionloom_train.data.sources import Places, Take, find_takes
 
 POSE = (92, 132)
@@ -55,7 +56,7 @@ def draw_look(
     *,
     each: int = 2,
     find: Finder = find_takes,
-    progress: Callable[[str], None] = print,
+    progress: Say = print,
 ) -> Path:
     """Write a PNG: a row for each clip, the recording at the left and the built one at the right.
 

@@ -12,9 +12,8 @@ mean, each one's planted feet slide by about d / 2 of how fast that person trave
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from csv import DictReader
-from csv import Error as CsvError
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,7 +28,8 @@ from motionloom.kinematics.physics import Array
 from motionloom.reading import read_bytes
 from motionloom.skeleton import SMPL22
 from motionloom_train.data import sources
-from motionloom_train.data.paths import inside
+from motionloom_train.data.paths import DAMAGED, inside
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.words import mirror_text
 
 _MAX_CAPTIONS = 1 << 20
@@ -73,9 +73,7 @@ class Pair:
         return self.positions.shape[1]
 
 
-def find_pairs(
-    folder: Path | str, *, captions: bool = True, say: Callable[[str], None] = lambda line: None
-) -> list[Pair]:
+def find_pairs(folder: Path | str, *, captions: bool = True, say: Say = silent) -> list[Pair]:
     """The pairs of a folder, whose layout is recognised by the files in it; `captions` as in `read_pair_folder`."""
     folder = Path(folder)
     if not folder.is_dir():
@@ -90,7 +88,7 @@ def find_pairs(
 # The pack ------------------------------------------------------------------------------------------------------------
 
 
-def read_pack_pairs(folder: Path | str, *, say: Callable[[str], None] = lambda line: None) -> list[Pair]:
+def read_pack_pairs(folder: Path | str, *, say: Say = silent) -> list[Pair]:
     """The couples of a folder with manifest.csv: rows that name each other as ``partner``, in the manifest's splits."""
     folder = Path(folder)
     manifest = folder / "manifest.csv"
@@ -104,7 +102,7 @@ def read_pack_pairs(folder: Path | str, *, say: Callable[[str], None] = lambda l
         for first, second in couples:
             say(f"reading {first['clip']} and {second['clip']}")
             pairs.append(_pack_pair(folder, first, second))
-    except (OSError, KeyError, TypeError, ValueError, AttributeError, OverflowError, CsvError) as error:
+    except DAMAGED as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{manifest} has no pairs that can be read ({type(error).__name__}: {reason})") from None
     if not pairs:
@@ -144,14 +142,11 @@ def read_pair_folder(folder: Path | str, *, captions: bool = True) -> list[Pair]
     folder = Path(folder)
     files = _pair_files(folder)
     said = _captions(folder, set(files), needed=captions)
+    splits = {4: "val", 9: "test"} if len(files) >= 10 else {}
     return [
-        _own_pair(name, files[name], "train" if len(files) < 10 else _split(number), said.get(name, ()))
+        _own_pair(name, files[name], splits.get(number % 10, "train"), said.get(name, ()))
         for number, name in enumerate(sorted(files))
     ]
-
-
-def _split(number: int) -> str:
-    return {4: "val", 9: "test"}.get(number % 10, "train")
 
 
 def _pair_files(folder: Path) -> dict[str, tuple[Path, Path]]:
@@ -209,12 +204,9 @@ def _caption(line: str, names: set[str], place: str) -> tuple[str, str]:
     if len(words) > _LONGEST_CAPTION or not words.isprintable():
         raise MotionloomError(f"{place} has a caption that is no line of at most {_LONGEST_CAPTION} printable letters")
     if name not in names:  # names are looked up only, so none leads anywhere
-        raise MotionloomError(f"{place} names {name[:60]!r}, which is no pair of that folder; it has {_list(names)}")
+        has = ", ".join(sorted(names)[:3]) + (" and others" if len(names) > 3 else "")
+        raise MotionloomError(f"{place} names {name[:60]!r}, which is no pair of that folder; it has {has}")
     return name, words
-
-
-def _list(names: set[str]) -> str:
-    return ", ".join(sorted(names)[:3]) + (" and others" if len(names) > 3 else "")
 
 
 def _own_pair(name: str, files: tuple[Path, Path], split: str, captions: tuple[str, ...]) -> Pair:
@@ -224,9 +216,6 @@ def _own_pair(name: str, files: tuple[Path, Path], split: str, captions: tuple[s
     if read_bytes(first) == read_bytes(second):
         raise MotionloomError(f"{label} are the same file; a pair needs a recording of each person")
     return Pair(name, split, captions, "own", sources.UNKNOWN_LICENCE, together(*motions, name=label))
-
-
-# One world -----------------------------------------------------------------------------------------------------------
 
 
 # Parts and variants --------------------------------------------------------------------------------------------------

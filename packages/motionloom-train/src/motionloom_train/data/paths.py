@@ -1,9 +1,18 @@
-"""Paths that a data set's own files name."""
+"""Paths that a data set's own files name, and what damaged files raise."""
 
+import csv
 from contextlib import suppress
 from pathlib import Path
 
+from safetensors import SafetensorError
+
 from motionloom.errors import MotionloomError
+
+DAMAGED = (
+    *(OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError),
+    *(csv.Error, SafetensorError),
+)
+"""What is raised where values are taken out of a file that is damaged or of another kind."""
 
 
 def inside(folder: Path, relative: str) -> Path:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
 from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.sources import Take, find_takes
 
 CMU_TEST = ("02", "05", "09", "13", "39")
@@ -89,7 +90,7 @@ def read_cmu(
     folder: Path | str,
     *,
     splits: tuple[str, ...] = ("train", "val", "test"),
-    say: Callable[[str], None] = lambda line: None,
+    say: Say = silent,
 ) -> Protocol:
     """The CMU part of the mocap pack (or a CMU download), whole subjects held out, as the uniform person at 30 fps.
 
@@ -100,7 +101,7 @@ def read_cmu(
     return checked(folder, Protocol("cmu", 30.0, 30, 60, SMPL_LAYOUT, recordings, takes[0].licence if takes else ""))
 
 
-def read_folder(folder: Path | str, *, fps: float = 30.0, say: Callable[[str], None] = lambda line: None) -> Protocol:
+def read_folder(folder: Path | str, *, fps: float = 30.0, say: Say = silent) -> Protocol:
     """Motion files of a user's own (.bvh, .amc with .asf): of every ten the fifth is for validation, the last for
     test."""
     takes = sorted(find_takes(folder), key=lambda take: take.name)
@@ -124,7 +125,7 @@ def _read(
     fps: float,
     split: Callable[[Take], str],
     subject: Callable[[Take], str],
-    say: Callable[[str], None],
+    say: Say,
 ) -> Iterator[Recording]:
     for number, take in enumerate(takes):
         if number % 50 == 0:

@@ -1,5 +1,6 @@
 """A built set in memory: its clips end to end, and what is said of each stretch."""
 
+import functools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +14,37 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, LAYOUT
 from motionloom.io.atomic import finished
 from motionloom.io.text import parse_json, read_utf8
+from motionloom.reading import read_table
 from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
 from motionloom_train.data.clips import MADE, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
-from motionloom_train.data.sayings import sayings
 from motionloom_train.data.words import EVENTS, STATES, phrases, sentence
+
+
+@functools.cache
+def table() -> dict[str, dict[str, list[str]]]:
+    """Whole sentences that people type, of more forms than a subject and a verb phrase.
+
+    ``action:NAME``, ``gesture:NAME`` or ``label:NAME`` to ``says``, and ``sided`` with ``{side}``.
+    """
+    return read_table("motionloom_train.data", "sayings.toml")
+
+
+def sayings(note: Note) -> tuple[str, ...]:
+    """The table's sentences for what a note says; none for captions, and for gestures of people who walk or sit."""
+    name = note.kind.removeprefix(PREFIX)
+    if not note.kind.startswith(PREFIX):
+        return tuple(table().get(f"label:{name}", {}).get("says", ()))
+    made = name.startswith(MADE)
+    if made and any(re.search(r"\b(walk|sit)\w* and ", text) for text in note.texts):
+        return ()
+    entry = table().get(f"gesture:{name.removeprefix(MADE)}" if made else f"action:{name}", {})
+    side = side_of(note.texts)
+    turns_right = name in ACTIONS and ACTIONS[name].turns and side == "right"
+    plain = [] if turns_right else entry.get("says", [])
+    return (*plain, *(text.replace("{side}", side) for text in entry.get("sided", ()) if side))
+
 
 WORDINGS = 48
 """Sentences made per measured label."""

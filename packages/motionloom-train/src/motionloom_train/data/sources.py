@@ -20,7 +20,7 @@ from motionloom.io.npz import read_array
 from motionloom.kinematics.physics import Array
 from motionloom.motion import Motion
 from motionloom.retarget import joints22, to_smpl22
-from motionloom_train.data.paths import inside
+from motionloom_train.data.paths import DAMAGED, inside
 from motionloom_train.data.words import check_caption, describe_index
 
 CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
@@ -110,12 +110,12 @@ def _pack(folder: Path) -> Iterator[Take]:
         for row in _json_lines(captions) if captions.is_file() else ():
             span = Span(float(row["start_s"]), float(row["end_s"]), tuple(map(str, row["captions"])), "human")
             written.setdefault(row["clip"], []).append(span)
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+    except DAMAGED as error:
         raise _unusable(captions, error, "mend it") from None
     try:
         lines = io.StringIO(text.read_utf8(manifest, max_bytes=MAX_MANIFEST, empty=True), newline="")
         yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, csv.Error) as error:
+    except DAMAGED as error:
         raise _unusable(manifest, error, "mend it") from None
 
 
@@ -152,7 +152,7 @@ def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
             if (match := re.search(r"CMU/\d+/(\d+_\d+)_poses", row["amass_path"])) and not row["mirrored"]:
                 spoken.setdefault(match.group(1), []).append(_amass_span(row))
                 kinds.setdefault(match.group(1), set()).add(str(row["split"]))
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+    except DAMAGED as error:
         raise _unusable(captions, error, "name HumanML3D's captions") from None
     for path in finished(folder, "**/*.amc", "**/*.bvh"):
         number = "_".join(part.zfill(2) for part in path.stem.split("_"))

@@ -4,7 +4,6 @@
 are already on this machine. The embedded default is `motionloom.runtime.text.minilm`, whose network is `bert.Bert`.
 """
 
-from motionloom_train.nets.text.clip import ClipText
-from motionloom_train.nets.text.distilbert import DistilBert
+from motionloom_train.nets.text.hub import ClipText, DistilBert
 
 __all__ = ["ClipText", "DistilBert"]

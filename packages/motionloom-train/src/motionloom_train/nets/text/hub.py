@@ -1,8 +1,9 @@
-"""Open a published Hugging Face text model from a folder or from the hub's local cache; never downloads.
+"""Published Hugging Face text models, CLIP and DistilBERT, from a folder or the hub's local cache; never downloads.
 
 `lab.papers.text_model` turns a folder's pytorch_model.bin into the model.safetensors that is wanted here.
 """
 
+import html
 import importlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -121,3 +122,73 @@ class PretrainedText:
     def _rows(self, ids: list[list[int]], padded: torch.Tensor, real: torch.Tensor) -> list[Row]:
         """States and pooled vector of each text; real: which ids are no padding."""
         raise NotImplementedError
+
+
+CLIP = "openai/clip-vit-base-patch32"
+HUMANML_LENGTH = 22  # 20 word pieces, start and end: what the HumanML3D and KIT models saw
+
+
+class ClipText(PretrainedText):
+    """tokens: last hidden states after the final norm; pooled: the projected state at the end mark, not normalised.
+
+    The published code pads the ids with zeros to 77 places. The tower is causal and the end mark comes before the
+    padding, so nothing here depends on it and the padding is left out.
+    """
+
+    name = "clip"
+
+    def __init__(self, parts: Pretrained, *, length: int = HUMANML_LENGTH, cache: int = 1024) -> None:
+        config = parts.model.config
+        if config.hidden_size != config.projection_dim:
+            raise MotionloomError(
+                f"This CLIP has states of width {config.hidden_size} and pooled vectors of width "
+                f"{config.projection_dim}; name one where they agree, as in {CLIP}."
+            )
+        places = int(config.max_position_embeddings)
+        if not 2 <= length <= places:
+            raise ValueError(f"length {length} is not in 2..{places}")
+        super().__init__(parts, length=length, cache=cache)
+
+    @staticmethod
+    def open(place: Path | str = CLIP, *, length: int = HUMANML_LENGTH) -> "ClipText":
+        """Open from a folder or the hub's cache; length counts word pieces with both marks (22 or 77).
+
+        Raises MotionloomError where transformers (extra `clip`) or the files are missing.
+        """
+        return ClipText(open_pretrained("CLIPTextModelWithProjection", place, extra="clip"), length=length)
+
+    def ids(self, text: str) -> list[int]:
+        """Byte-pair ids; what HTML hides is read first, as CLIP does."""
+        return super().ids(html.unescape(html.unescape(text)))
+
+    def _rows(self, ids: list[list[int]], padded: torch.Tensor, real: torch.Tensor) -> list[Row]:
+        out = self._model(padded)
+        return [
+            (states[: len(row)].cpu().numpy().copy(), pooled.cpu().numpy())
+            for row, states, pooled in zip(ids, out.last_hidden_state, out.text_embeds)
+        ]
+
+
+DISTILBERT = "distilbert/distilbert-base-uncased"
+
+
+class DistilBert(PretrainedText):
+    """tokens: last hidden states, start and end marks included; pooled: their mean, not normalised."""
+
+    name = "distilbert"
+
+    def __init__(self, parts: Pretrained, *, cache: int = 1024) -> None:
+        super().__init__(parts, length=int(parts.model.config.max_position_embeddings), cache=cache)
+
+    @staticmethod
+    def open(place: Path | str = DISTILBERT) -> "DistilBert":
+        """Open from a folder or the hub's cache.
+
+        Raises MotionloomError where transformers (extra `distilbert`) or the files are missing.
+        """
+        return DistilBert(open_pretrained("DistilBertModel", place, extra="distilbert"))
+
+    def _rows(self, ids: list[list[int]], padded: torch.Tensor, real: torch.Tensor) -> list[Row]:
+        out = self._model(padded, attention_mask=real).last_hidden_state
+        words = [states[: len(row)].cpu().numpy().copy() for row, states in zip(ids, out)]
+        return [(states, states.mean(0)) for states in words]

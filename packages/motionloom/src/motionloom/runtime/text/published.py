@@ -6,7 +6,7 @@ from importlib import import_module
 from motionloom.errors import MotionloomError
 from motionloom.runtime.text.protocol import TextEmbedding, TextEncoder
 
-READER = "motionloom_train.nets.text.clip"
+READER = "motionloom_train.nets.text.hub"
 """The module that opens CLIP, which needs PyTorch."""
 
 

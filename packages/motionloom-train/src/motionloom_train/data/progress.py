@@ -1,0 +1,10 @@
+"""Who hears of progress."""
+
+from collections.abc import Callable
+
+Say = Callable[[str], None]
+"""Called with a line of progress now and then."""
+
+
+def silent(line: str) -> None:
+    """Say nothing."""
