@@ -202,7 +202,7 @@ def profile(rows: int, steps: int, weights: str) -> None:
         for one, made in maker.make([ask(line) for line in lines]):
             assert not isinstance(made, str), made
             for kind, file in files.items():
-                timed(f"files, {kind}", file.add)(made.people, entry_of(one, made))
+                timed(f"files, {kind}", file.add)(made, entry_of(one, made))
     whole = sum(seconds for name, seconds in spent.items() if not name.startswith("files")) + spent["files, npz"]
     print(f"\nprocessor time of one process, {rows} motions of 4 s, {steps} steps; shares with npz files")
     for name, seconds in spent.items():

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from motionloom.server.components import components, request_of
 from motionloom.server.job_request import TASKS
 from motionloom.server.limits import Limits
+from motionloom.server.openapi import components, request_of
 
 PLACE = Path(__file__).parents[1] / "studio" / "src" / "server" / "types.ts"
 HEAD = "/** What a job may be asked. Written by tools/write_types.py; do not change it here. */\n"

@@ -184,9 +184,9 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
     before(
         *{
             "parse": (row_module, "_columns", lambda raw: raw),
-            "ask": (row_module.Sources, "_ask", lambda self, row: row.seed),
+            "ask": (row_module.Sources, "_robot", lambda self, row: row.seed),
             "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
-            "add": (writers_module.Files, "add", lambda self, people, about, angles: about["seed"]),
+            "add": (writers_module.Files, "add", lambda self, made, about: about["seed"]),
             "run": (maker_module, "run_each", lambda plans, *_: "99" if any(p.seconds == 0.95 for p in plans) else ""),
         }[at]
     )

@@ -351,7 +351,7 @@ def test_what_is_mixed_up_is_said(words: tuple[str, ...], said: str, capsys: pyt
 def test_a_seat_is_as_high_and_far_as_the_character_needs(
     weights: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("motionloom.kinematics.gestures.seats", lambda *_: [Seat(0.0, 1.0, 0.4, 0.1, -0.2)])
+    monkeypatch.setattr("motionloom.cli.generate.seats", lambda *_: [Seat(0.0, 1.0, 0.4, 0.1, -0.2)])
     Hero(size=1.3).write(Path("giant.glb"))
     line = ["generate", "a person sits", "--seconds", "1", "--weights", weights, *TINY]
     assert main([*line, "--skeleton", "giant.glb"]) == 0

@@ -8,8 +8,8 @@ import pytest
 from motionloom.errors import MotionloomError
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, Taken
 from motionloom.live.live import Frame, Live, motion_of
+from motionloom.live.person import stays
 from motionloom.live.settings import Settings
-from motionloom.live.words import stays
 from motionloom.motion import Motion
 from motionloom.weights.prior import Prior
 from tests.live import people

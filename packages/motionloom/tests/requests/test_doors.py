@@ -44,8 +44,8 @@ def test_a_command_has_an_option_for_every_field_that_can_be_typed(task: str) ->
 @pytest.mark.parametrize("task", REQUESTS)
 def test_the_server_describes_the_fields(task: str) -> None:
     pytest.importorskip("starlette", reason="needs the extra 'studio'")
-    from motionloom.server.components import components, request_of
     from motionloom.server.limits import Limits
+    from motionloom.server.openapi import components, request_of
 
     limits = Limits()
     keys = components(limits)[request_of(task)]["properties"]

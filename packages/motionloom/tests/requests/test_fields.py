@@ -14,9 +14,8 @@ from motionloom import diffusion
 from motionloom.errors import MotionloomError
 from motionloom.requests import sampling
 from motionloom.requests.fields import specs
-from motionloom.requests.generate import Generate
 from motionloom.requests.reading import read
-from motionloom.requests.tasks import REQUESTS
+from motionloom.requests.tasks import REQUESTS, Generate
 
 SOURCE = Path(motionloom.__file__).parent
 

@@ -13,9 +13,8 @@ from starlette.routing import Route
 from motionloom.requests.fields import specs
 from motionloom.requests.tasks import REQUESTS
 from motionloom.server.app import routes
-from motionloom.server.components import request_of
 from motionloom.server.limits import Limits
-from motionloom.server.openapi import as_page, document
+from motionloom.server.openapi import as_page, document, request_of
 
 UNTOLD = {"/openapi.json", "/docs", "/"}
 

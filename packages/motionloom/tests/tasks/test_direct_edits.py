@@ -9,7 +9,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.kinematics.gaze import NOD, TURN, looking, looks
 from motionloom.motion import Motion
-from motionloom.requests.edit import Edit
+from motionloom.requests.tasks import Edit
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.direct_edits import Look, Overlay, Smooth

@@ -9,7 +9,7 @@ from PIL import Image
 from motionloom.errors import MotionloomError
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.viz import draw
-from motionloom.viz.grid import CAPTION, GAP, POSE, draw_grid
+from motionloom.viz.video import CAPTION, GAP, POSE, draw_grid
 from tests.kinematics.people import FPS, standing, walking
 
 GREEN, RED = (24, 178, 107), (208, 62, 62)

@@ -15,7 +15,6 @@ import pytest
 from motionloom import io
 from motionloom.cli import main
 from motionloom.cli.sampling import places as places_of
-from motionloom.cli.sampling import write
 from motionloom.cli.skeletons import Target
 from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
@@ -236,8 +235,8 @@ def test_motions_that_are_made_together_become_one_page_on_the_character(
     monkeypatch.chdir(tmp_path)
     character = load_character(Hero().write(tmp_path / "hero.glb"))
     hero = Target("hero.glb", character.skeleton, character=character)
-    [files] = places_of([Path("page.html")], 2, target=hero)
-    assert write([hero.put(standing(8))] * 2, files, ["first", "second"], hero) == [Path("page.html")]
+    [files] = places_of([Path("page.html")], 2, hero)
+    assert hero.save_all([hero.put(standing(8))] * 2, files, ["first", "second"]) == [Path("page.html")]
     given = Reader(Path("page.html").read_text()).given
     assert [take["name"] for take in given["takes"]] == ["first", "second"]
     assert given["character"]

@@ -18,7 +18,7 @@ from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
 from motionloom.reading import read_bytes
 from motionloom.viz import draw
-from motionloom.viz.grid import draw_grid
+from motionloom.viz.video import draw_grid
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import CHECKS, THEMES, Check
 from motionloom_lab.report.files import check_report, write_json

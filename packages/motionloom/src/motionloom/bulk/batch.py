@@ -93,7 +93,10 @@ def run(
         manifest = open_folder(out, options, rows=count, shard_rows=shard_rows, force=force)
         size = int(manifest["shard_rows"])
         store, shards = Store(out, options.format), -(-count // size)
-        _check_left_over(store, shards)
+        if store.record(shards).exists():
+            raise MotionloomError(
+                f"{out} holds more shards than the job has, of rows that it no longer asks for; name another folder"
+            )
         work = Batch(
             str(out.resolve()),
             str(jobs.folder.resolve()),
@@ -107,7 +110,9 @@ def run(
             claimed.check()
             made += report.made
             yield report
-        _finish(store, shards, changed=made > 0)
+        whole = all(store.record(shard).exists() for shard in range(shards))  # whoever made them
+        if whole and (made or damaged_table(store) is not None):
+            write_table(store, shards)
 
 
 def _reports(
@@ -249,13 +254,6 @@ def processes(options: Options) -> int:
     return gpus() if options.device == "cuda" else cores()
 
 
-def _check_left_over(store: Store, shards: int) -> None:
-    if store.record(shards).exists():
-        raise MotionloomError(
-            f"{store.out} holds more shards than the job has, of rows that it no longer asks for; name another folder"
-        )
-
-
 def _check_same_job(jobs: Jobs, out: Path, options: Options) -> None:
     """Raise `MotionloomError` where the first shards of a folder hold motions, and this job asks for none of them."""
     manifest = read_manifest(out)
@@ -285,11 +283,3 @@ def _words(raw: bytes, seed: int) -> tuple[str, int] | None:
         return "", -1
     said = row.prompt or row.motion or ""
     return None if row.timeline is not None else (said, seed if row.seed is None else row.seed)
-
-
-def _finish(store: Store, shards: int, *, changed: bool) -> None:
-    """When every shard is there, whoever made it: the table of all rows, and no traces of the work."""
-    if not all(store.record(shard).exists() for shard in range(shards)):
-        return
-    if changed or damaged_table(store) is not None:
-        write_table(store, shards)

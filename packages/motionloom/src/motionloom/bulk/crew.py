@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import warnings
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -51,9 +51,19 @@ def search_path() -> str:
     return os.pathsep.join([source, *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
-def too_many_deaths(deaths: int, rows: int) -> bool:
-    """Whether a shard ended so many processes that its rows cannot be the reason alone."""
-    return deaths > 3 * rows + 10
+class Again:
+    """Tasks whose makers died, to be begun again."""
+
+    def __init__(self) -> None:
+        self.tasks: deque[Task] = deque()
+        self._deaths: Counter[int] = Counter()
+
+    def add(self, task: Task, cause: str) -> None:
+        """One task more; `MotionloomError` for so many deaths at it that its rows cannot be the reason alone."""
+        self._deaths[task.shard] += 1
+        if self._deaths[task.shard] > 3 * len(task.rows) + 10:
+            raise MotionloomError(f"shard {task.shard} ends every {cause}")
+        self.tasks.append(task)
 
 
 def _cause(code: int | None) -> str:
@@ -134,8 +144,7 @@ class _Crew:
         self.items, self.batch, self.workers, self.moved = items, batch, workers, moved
         self.received: queue.Queue[tuple[_Process, dict[str, Any] | None]] = queue.Queue()
         self.processes: list[_Process] = []
-        self.again: deque[Task] = deque()
-        self.deaths: dict[int, int] = {}
+        self.again = Again()
         self.stillborn = 0
         self.warned: set[str] = set()
 
@@ -155,7 +164,7 @@ class _Crew:
             idle = next((process for process in self.processes if process.task is None), None)
             if idle is None and len(self.processes) >= self.workers:
                 return
-            item = self.again.popleft() if self.again else next(self.items, None)
+            item = self.again.tasks.popleft() if self.again.tasks else next(self.items, None)
             if item is None:
                 return
             if isinstance(item, Report):
@@ -196,9 +205,4 @@ class _Crew:
                 f"the processes that make motions end before they begin, by {_cause(process.popen.returncode)}"
             )
         if task is not None:
-            self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
-            if too_many_deaths(self.deaths[task.shard], len(task.rows)):
-                raise MotionloomError(
-                    f"shard {task.shard} ends every process that makes it, by {_cause(process.popen.returncode)}"
-                )
-            self.again.append(task)
+            self.again.add(task, f"process that makes it, by {_cause(process.popen.returncode)}")

@@ -15,6 +15,9 @@ from motionloom.bulk.shard import entry_of
 from motionloom.bulk.writers import sizes, writer
 from motionloom.errors import MotionloomError
 
+SAMPLE = 16
+"""Rows that are looked at."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -41,21 +44,22 @@ class Estimate:
         return self.rows * self.usable * self.bytes_each / 1e9
 
 
-def estimate(jobs: Jobs, options: Options, *, workers: int, sample: int = 16) -> Estimate:
+def estimate(jobs: Jobs, options: Options, *, workers: int) -> Estimate:
     """Make a random sample of the rows once in this process; nothing is kept of it.
 
     One pass through the job counts its rows and draws the sample. The first call of a network is not counted.
     """
-    rows, chosen = _sampled(jobs, sample)
+    rows, chosen = _sampled(jobs, SAMPLE)
     maker = Maker(options, folder=jobs.folder)
     asked: list[Asked] = []
+    problems: list[MotionloomError] = []
     for raw in chosen:
         try:
             asked.append(maker.sources.ask(parse(raw)))
-        except MotionloomError:
-            continue
+        except MotionloomError as error:
+            problems.append(error)
     if not asked:
-        raise MotionloomError(f"none of {len(chosen)} rows looked at can be made; see: {_why(chosen[0], maker)}")
+        raise MotionloomError(f"none of {len(chosen)} rows looked at can be made; see: {problems[0]}")
     list(maker.make(asked[:1]))
     passes = Filter(options.filter) if options.filter else None
     with tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
@@ -64,7 +68,7 @@ def estimate(jobs: Jobs, options: Options, *, workers: int, sample: int = 16) ->
         unique = {one.id: one for one in asked}
         for one, made in maker.make(list(unique.values())):
             if isinstance(made, Made) and made.passes(passes):
-                file.add(made.people, entry_of(one, made), made.angles)
+                file.add(made, entry_of(one, made))
                 kept += 1
         file.close()
         seconds, size = time.perf_counter() - began, sizes(Path(folder) / "data")["bytes"]
@@ -82,11 +86,3 @@ def _sampled(jobs: Jobs, count: int) -> tuple[int, Sequence[bytes]]:
         elif (place := dice.randrange(rows)) < count:
             chosen[place] = raw
     return rows, chosen
-
-
-def _why(raw: bytes, maker: Maker) -> str:
-    try:
-        maker.sources.ask(parse(raw))
-    except MotionloomError as error:
-        return str(error)
-    return ""

@@ -276,6 +276,14 @@ def read_manifest(out: Path, *, anew: bool = False) -> dict[str, Any] | None:
     return found
 
 
+def find_batch(folder: Path) -> tuple[Store, int]:
+    """A batch that is there, and of how many shards it is; raises `MotionloomError` where there is none."""
+    manifest = read_manifest(folder)
+    if manifest is None:
+        raise MotionloomError(f"{folder} holds no batch; name a folder that 'motionloom batch' made")
+    return Store(folder, manifest["files"]), -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
+
+
 def _damaged(what: str) -> MotionloomError:
     return MotionloomError(
         f"{what}: run the command that made the batch with --force, which writes it anew and keeps the motions that "

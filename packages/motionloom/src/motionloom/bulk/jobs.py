@@ -108,7 +108,9 @@ class Jobs:
         if self.path is None or self.rows:
             yield from (_json(dict(row)) for row in self.rows)
         elif self.variants is not None:
-            yield from self._prompts(self.path, self.variants)
+            for line in _lines(self.path):
+                prompt = line.decode("utf-8", "replace").strip()
+                yield from (_json({"prompt": prompt, "seed": self.seed + i}) for i in range(self.variants))
         elif self.path.suffix.lower() == ".csv":
             yield from _csv(self.path)
         elif self.path.suffix.lower() == ".parquet":
@@ -131,12 +133,6 @@ class Jobs:
         rows = self.read()
         while part := list(islice(rows, size)):
             yield part
-
-    def _prompts(self, path: Path, variants: int) -> Iterator[bytes]:
-        for line in _lines(path):
-            prompt = line.decode("utf-8", "replace").strip()
-            for variant in range(variants):
-                yield _json({"prompt": prompt, "seed": self.seed + variant})
 
 
 def shard_size(rows: int) -> int:

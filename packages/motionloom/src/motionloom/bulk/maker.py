@@ -239,10 +239,12 @@ class Maker:
         for one in rows:
             check_format(self.options.format, robot=one.robot is not None)
         first = rows[0]
-        if first.clip is not None:
-            return [self._export(first, first.clip)]
-        if first.row.task in ("control", "compose"):
-            self._only_ddpm(first)
+        if first.clip is not None:  # a recording as it is
+            motion = load(first.clip)
+            person = motion if motion.skeleton == SMPL22 else to_smpl22(motion)
+            return [self._finished(first, [motion], [measure(person, first.text, self.judge)])]
+        if first.row.task in ("control", "compose") and self.options.solver != SOLVER:
+            raise MotionloomError(f"the task {first.row.task} is made with the solver {SOLVER}")
         if first.row.task == "duet":
             return [self._duet(first)]
         if first.timeline is not None:
@@ -256,7 +258,6 @@ class Maker:
         ]
 
     def _plan(self, asked: Asked) -> Plan:
-        """What a row asks of its task."""
         options, row, timeline = self.options, asked.row, asked.timeline
         task = row.task or "generate"
         goals = (None, asked.goal) if row.whom else (asked.goal, None)
@@ -294,12 +295,6 @@ class Maker:
             batch_size=self.together if asked.timeline is None and asked.row.task != "duet" else None,
         )
 
-    def _export(self, asked: Asked, clip: Path) -> Made:
-        """A recording as it is, on the row's skeleton or robot."""
-        motion = load(clip)
-        person = motion if motion.skeleton == SMPL22 else to_smpl22(motion)
-        return self._finished(asked, [motion], [measure(person, asked.text, self.judge)])
-
     def _duet(self, asked: Asked) -> Made:
         """Two people, one pair at a time: what is drawn beside it would change the last bits."""
         texts = (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.words)
@@ -310,10 +305,6 @@ class Maker:
             person = asked.row.whom
             measured[person] |= _misses(evaluate(duet[person], duet[person], asked.goal))
         return self._finished(asked, duet, measured)
-
-    def _only_ddpm(self, asked: Asked) -> None:
-        if self.options.solver != SOLVER:
-            raise MotionloomError(f"the task {asked.row.task} is made with the solver {SOLVER}")
 
     def _measured(self, asked: Asked, motion: Motion, **measured: float) -> Made:
         return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])

@@ -88,17 +88,17 @@ class Filter:
         if len(text) > 1000:
             raise MotionloomError(f"the filter has {len(text):,} characters; say it in at most 1,000")
         try:
-            self._tree = ast.parse(text.strip(), mode="eval").body
+            tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, MemoryError, RecursionError):
             raise MotionloomError(
                 f"the filter {text!r} is no condition; write one such as: skate < 0.2 and obeys"
             ) from None
-        _check(self._tree, text)
-        self.names = frozenset(node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+        self._value = _compiled(tree, text)
+        self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
 
     def holds(self, values: Values) -> bool:
         """Whether the measures meet the condition; what is unknown does."""
-        found = _value(self._tree, values)
+        found = self._value(values)
         return True if found is None else bool(found)
 
 
@@ -110,65 +110,57 @@ _COMPARE: dict[type, Callable[[Any, Any], bool]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
 }
-_COUNT: dict[type, Callable[[Any, Any], float]] = {
+_COUNT: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
+    ast.Div: lambda a, b: None if b == 0 else a / b,
 }
 
 
-def _check(node: ast.expr, text: str, depth: int = 0) -> None:
-    """Refuse everything but what `_value` knows."""
+def _compiled(node: ast.expr, text: str, depth: int = 0) -> Callable[[Values], Any]:
+    """What computes the value of an expression, None where it is unknown (as in Kleene's logic of three values).
+
+    Raises `MotionloomError` for every other expression.
+    """
+    if depth > 50:
+        raise MotionloomError("the filter is nested too deeply; say it more plainly")
+
+    def inside(*parts: ast.expr) -> list[Callable[[Values], Any]]:
+        return [_compiled(part, text, depth + 1) for part in parts]
+
     match node:
-        case ast.BoolOp(values=inner):
-            parts = inner
-        case ast.UnaryOp(op=ast.Not() | ast.USub(), operand=inner):
-            parts = [inner]
+        case ast.BoolOp(op=op, values=parts):
+            found = inside(*parts)
+            return lambda values: _all_or_any(isinstance(op, ast.Or), [part(values) for part in found])
+        case ast.UnaryOp(op=ast.Not() | ast.USub() as op, operand=part):
+            return _of_known(operator.not_ if isinstance(op, ast.Not) else operator.neg, inside(part))
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _COUNT:
-            parts = [left, right]
+            return _of_known(_COUNT[type(op)], inside(left, right))
         case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARE for op in ops):
-            parts = [left, *others]
-        case ast.Constant(value=bool() | int() | float()):
-            parts = []
+            found = inside(left, *others)
+            return lambda values: _compared(ops, [part(values) for part in found])
+        case ast.Constant(value=bool() | int() | float() as value):
+            return lambda values: value
         case ast.Name(id=name):
             if name not in MEANING and name not in ROBOT:
                 known = ", ".join((*MEANING, *ROBOT))
                 raise MotionloomError(f"the filter {text!r} asks for {name!r}; the measures are {known}")
-            parts = []
-        case _:
-            said = (ast.get_source_segment(text.strip(), node) or "")[:40]
-            raise MotionloomError(
-                f"the filter {text!r} holds {said!r}; it may hold comparisons of measures and numbers, and, or, not"
-            )
-    if depth > 50:
-        raise MotionloomError("the filter is nested too deeply; say it more plainly")
-    for part in parts:
-        _check(part, text, depth + 1)
+            return lambda values: values.get(name)
+    said = (ast.get_source_segment(text.strip(), node) or "")[:40]
+    raise MotionloomError(
+        f"the filter {text!r} holds {said!r}; it may hold comparisons of measures and numbers, and, or, not"
+    )
 
 
-def _value(node: ast.expr, values: Values) -> Any:
-    """The value of a checked expression; None is unknown (as in Kleene's logic of three values)."""
-    match node:
-        case ast.BoolOp(op=op, values=parts):
-            return _all_or_any(isinstance(op, ast.Or), [_value(part, values) for part in parts])
-        case ast.UnaryOp(op=op, operand=part):
-            found = _value(part, values)
-            if found is None:
-                return None
-            return not found if isinstance(op, ast.Not) else -found
-        case ast.BinOp(left=left, op=op, right=right):
-            a, b = _value(left, values), _value(right, values)
-            if a is None or b is None or (isinstance(op, ast.Div) and b == 0):
-                return None
-            return _COUNT[type(op)](a, b)
-        case ast.Compare(left=left, ops=ops, comparators=others):
-            return _compared(ops, [_value(part, values) for part in (left, *others)])
-        case ast.Name(id=name):
-            return values.get(name)
-        case ast.Constant(value=value):
-            return value
-    raise AssertionError("unchecked expression")
+def _of_known(function: Callable[..., Any], parts: Sequence[Callable[[Values], Any]]) -> Callable[[Values], Any]:
+    """A function of parts, unknown where one of them is."""
+
+    def value(values: Values) -> Any:
+        found = [part(values) for part in parts]
+        return None if None in found else function(*found)
+
+    return value
 
 
 def _all_or_any(decisive: bool, found: Sequence[Any]) -> bool | None:

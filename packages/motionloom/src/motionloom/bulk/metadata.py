@@ -5,13 +5,14 @@ import tarfile
 import tempfile
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, read_manifest
+from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, find_batch
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import ROBOT
 from motionloom.bulk.row import hash_file
@@ -33,7 +34,7 @@ def write_table(store: Store, shards: int) -> Path:
 
     A row for each row of the job, in its order: where it went, what is known of it, or why it is not there.
     """
-    place = store.out / f"{TABLE}.{'parquet' if _has_parquet() else 'jsonl'}"
+    place = store.out / f"{TABLE}.{'parquet' if find_spec('pyarrow') else 'jsonl'}"
     with atomic_path(place) as temporary:
         if place.suffix == ".parquet":
             _write_parquet(temporary, _all(store, shards))
@@ -44,14 +45,6 @@ def write_table(store: Store, shards: int) -> Path:
     with atomic_path(store.out / RECORDS / ABOUT_TABLE) as temporary:
         temporary.write_text(json.dumps(about) + "\n", encoding="utf-8")
     return place
-
-
-def _has_parquet() -> bool:
-    try:
-        parquet()
-    except MotionloomError:
-        return False
-    return True
 
 
 def damaged_table(store: Store) -> Path | None:
@@ -136,12 +129,7 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
     Memory holds one shard. Raises `MotionloomError` for a folder that is no batch, and at a shard that is damaged as
     far as its record and the sizes of its files show; `motionloom.bulk.verify` looks at every byte.
     """
-    folder = Path(out)
-    manifest = read_manifest(folder)
-    if manifest is None:
-        raise MotionloomError(f"{folder} holds no batch; name a folder that 'motionloom batch' made")
-    store = Store(folder, manifest["files"])
-    shards = -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
+    store, shards = find_batch(Path(out))
     for shard in sorted(set(store.shards())):  # not those that the manifest counts, which may be any number
         if shard >= shards or not store.record(shard).exists():
             continue
@@ -162,7 +150,10 @@ def _motions(store: Store, shard: int, made: dict[str, int]) -> dict[Any, People
     if store.kind == "webdataset":
         return _from_tar(place, made) if place.exists() else {}
     if store.kind == "parquet":
-        return _from_parquet(place) if place.exists() else {}
+        if not place.exists():
+            return {}
+        with parquet().ParquetFile(place) as file:
+            return {row["id"]: _people(row) for part in file.iter_batches(batch_size=64) for row in part.to_pylist()}
     if store.kind == "glb":
         return {name: tuple(load_scene(place / f"{name}.glb")) for name in made}
     return {
@@ -185,11 +176,6 @@ def _from_tar(place: Path, made: Collection[str]) -> dict[Any, People]:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{place} is damaged ({reason}); delete it and run the batch again") from None
     return found
-
-
-def _from_parquet(place: Path) -> dict[Any, People]:
-    with parquet().ParquetFile(place) as file:
-        return {row["id"]: _people(row) for part in file.iter_batches(batch_size=64) for row in part.to_pylist()}
 
 
 def _people(row: dict[str, Any]) -> People:

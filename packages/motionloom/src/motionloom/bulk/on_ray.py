@@ -11,15 +11,13 @@ import re
 import socket
 import sys
 import warnings
-from collections import deque
 from collections.abc import Generator, Iterator
 from contextlib import redirect_stdout
 from dataclasses import asdict
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
-from motionloom.bulk.crew import Moved, search_path, too_many_deaths
+from motionloom.bulk.crew import Again, Moved, search_path
 from motionloom.bulk.shard import Batch, Report, Task
 from motionloom.errors import MotionloomError
 
@@ -35,15 +33,12 @@ class Hand:
     """What an actor does: shards, one after the other."""
 
     def __init__(self, line: str) -> None:
-        from motionloom.bulk.maker import Maker
         from motionloom.runtime import set_threads
 
         set_threads(1)
         self.batch, self.problem = Batch.from_json(line), ""
         try:
-            self.maker = Maker(
-                self.batch.options, folder=Path(self.batch.folder), weights=self.batch.weights, pair=self.batch.pair
-            )
+            self.maker = self.batch.maker()
         except MotionloomError as error:
             self.problem = str(error)
         except Exception as error:  # another actor would end alike
@@ -147,8 +142,7 @@ class _Crew:
         self.flight: dict[Any, tuple[Any, Task | None]] = {}
         """What is waited for: of which actor, and for which task (None: until it is ready)."""
         self.idle: list[Any] = []
-        self.again: deque[Task] = deque()
-        self.deaths: dict[int, int] = {}
+        self.again = Again()
         self.stillborn = 0
         self.looks = 0
         """Since when nobody has worked or answered, in looks."""
@@ -172,8 +166,8 @@ class _Crew:
 
     def _next(self) -> Generator[Report, None, Task | None]:
         """The next task; reports on the way to it are passed on."""
-        if self.again:
-            return self.again.popleft()
+        if self.again.tasks:
+            return self.again.tasks.popleft()
         for item in self.items:
             if isinstance(item, Task):
                 return item
@@ -220,7 +214,4 @@ class _Crew:
             if self.stillborn > 10 + 2 * self.workers:
                 raise MotionloomError(f"the workers of the Ray cluster end before they begin ({_shortened(error)})")
             return
-        self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
-        if too_many_deaths(self.deaths[task.shard], len(task.rows)):
-            raise MotionloomError(f"shard {task.shard} ends every worker that makes it; is there enough memory?")
-        self.again.append(task)
+        self.again.add(task, "worker that makes it; is there enough memory?")

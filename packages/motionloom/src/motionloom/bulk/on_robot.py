@@ -10,7 +10,7 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.robots.body import Robot, read_robot, to_motion
-from motionloom.robots.clip import FPS, Clip, put_on_robot
+from motionloom.robots.clip import FPS, put_on_robot
 from motionloom.robots.figures import measure
 from motionloom.robots.files import save_clip
 
@@ -46,13 +46,8 @@ class OnRobot:
         figures = measure(clip, self.robot, max_speed=self.max_speed)
         own = ("frames", "fps", "fastest")  # the record has the first two anyway
         found = {name: value for name, value in figures.as_dict().items() if name not in own}
-        return self._moving(clip), {**found, "faults": len(figures.faults())}, self._saving(clip)
-
-    def _moving(self, clip: Clip) -> Motion:
-        return to_motion(self.robot, clip.qpos, clip.fps)
-
-    def _saving(self, clip: Clip) -> Save:
-        return lambda path: save_clip(clip, self.robot, path)
+        moving = to_motion(self.robot, clip.qpos, clip.fps)
+        return moving, {**found, "faults": len(figures.faults())}, lambda path: save_clip(clip, self.robot, path)
 
     def determined(self) -> dict[str, Any]:
         """What of all this a clip depends on, as plain values."""

@@ -4,10 +4,10 @@ import hashlib
 import json
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import KW_ONLY, astuple, dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -102,17 +102,20 @@ def unexpected(error: Exception, what: str = "it cannot be read") -> Unexpected:
     return Unexpected(f"{what} ({type(error).__name__}: {' '.join(str(error).split())[:200]})")
 
 
-def parse(raw: bytes) -> Row:
-    """The row that the bytes of a JSON object ask for; raises `MotionloomError` for what cannot be."""
+@contextmanager
+def explained(what: str = "it cannot be read") -> Iterator[None]:
+    """Any exception within is `unexpected`, unless it is a `MotionloomError` already."""
     try:
-        return _parsed(raw)
+        yield
     except MotionloomError:
         raise
     except Exception as error:
-        raise unexpected(error) from error
+        raise unexpected(error, what) from error
 
 
-def _parsed(raw: bytes) -> Row:
+@explained()
+def parse(raw: bytes) -> Row:
+    """The row that the bytes of a JSON object ask for; raises `MotionloomError` for what cannot be."""
     row = _columns(raw)
     goal = _goal(row.get("goal"))
     if row.get("task") in _ELSEWHERE:
@@ -157,7 +160,12 @@ def _goal(goal: Any) -> str | dict[str, Any] | None:
     """The name of a goal file, or a mapping of its keys, which in a CSV file is text."""
     if goal is not None and not isinstance(goal, str | dict):
         raise MotionloomError("'goal' must be the name of a goal file or a mapping of its keys")
-    return _mapping(goal) if isinstance(goal, str) and goal.lstrip().startswith("{") else goal
+    if not (isinstance(goal, str) and goal.lstrip().startswith("{")):
+        return goal
+    try:
+        return json.loads(goal)
+    except (ValueError, RecursionError) as error:
+        raise MotionloomError(f"'goal' is no JSON ({error})") from None
 
 
 def _task(given: str | None, goal: bool, timeline: bool, motion: bool) -> str:
@@ -186,56 +194,39 @@ def _check_words(task: str, words: str) -> None:
         raise MotionloomError(f"the prompt {words[:60]!r} has words for two people; give the row the task duet")
 
 
-def _mapping(text: str) -> dict[str, Any]:
-    try:
-        value = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise MotionloomError(f"'goal' is no JSON ({error})") from None
-    return value
-
-
+@dataclass(eq=False)
 class Sources:
     """Reads the files that rows name, each once while it is in use, and gives rows their ids."""
 
-    def __init__(
-        self,
-        folder: Path,
-        common: Mapping[str, Any],
-        *,
-        pair: Mapping[str, Any] | None = None,
-        fps: float = FPS,
-        seconds: float = 5.0,
-        seed: int = 0,
-        skeleton: str | None = None,
-        literal: bool = False,
-        best_of: int = 1,
-        robot: OnRobot | None = None,
-        limits: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:
-        """``folder``: where these files lie, or below. ``common``: what determines every motion (weights, settings).
+    folder: Path
+    """Where these files lie, or below."""
+    common: Mapping[str, Any]
+    """What determines every motion: weights, settings."""
+    _: KW_ONLY
+    pair: Mapping[str, Any] = field(default_factory=dict)
+    """What else determines motions of two people."""
+    fps: float = FPS
+    """Of the weights."""
+    seconds: float = 5.0
+    """This and what follows is of rows that do not say."""
+    seed: int = 0
+    skeleton: str | None = None
+    """May lie anywhere."""
+    literal: bool = False
+    """No numbers are read in prompts."""
+    best_of: int = 1
+    robot: OnRobot | None = None
+    """Of rows that name no skeleton either."""
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    """``max_speed`` and ``avoid_collisions`` of a robot."""
 
-        pair: what else determines motions of two people. fps: of the weights. seconds, seed, skeleton: of rows that do
-        not say; a skeleton may lie anywhere. literal: no numbers are read in prompts. best_of:
-        of rows that do not say. robot: of rows that name none, and no skeleton; limits:
-        ``max_speed`` and ``avoid_collisions`` of a robot whose row does not say.
-        """
-        self.robot, self._limits = robot, limits
-        self.literal, self.best_of = literal, best_of
-        self.folder, self.fps, self.seconds, self.seed, self.skeleton = folder, fps, seconds, seed, skeleton
-        self._pair = dict(pair or {})
-        self._common = json.dumps({**common, "format": FORMAT}, sort_keys=True)
+    def __post_init__(self) -> None:
+        self._common = json.dumps({**self.common, "format": FORMAT}, sort_keys=True)
         self._cache, self._written = _Kept(), _Kept()
 
+    @explained()
     def ask(self, row: Row) -> Asked:
         """The row with the files it names; raises `MotionloomError` for what is wrong in them."""
-        try:
-            return self._ask(row)
-        except MotionloomError:
-            raise
-        except Exception as error:
-            raise unexpected(error) from error
-
-    def _ask(self, row: Row) -> Asked:
         timeline = start = clip = None
         goal: tuple[Goal | None, str | None] = (None, None)
         robot = self._robot(row)
@@ -272,7 +263,7 @@ class Sources:
         if best_of > 1:
             said["best_of"] = best_of
         if row.task == "duet":
-            said |= {"pair": self._pair, "person": row.whom + 1}
+            said |= {"pair": dict(self.pair), "person": row.whom + 1}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of, clip, robot)
 
@@ -294,7 +285,12 @@ class Sources:
         if row.seconds is not None and not SHORTEST <= row.seconds <= LONGEST:
             return None, None
         words = (row.words, row.seconds, metre)
-        return self._written.get(words, lambda: _timeline_in(*words))
+
+        def written() -> tuple[Timeline | None, str | None]:
+            found = timeline_of(row.words, row.seconds, amounts=True, metre=metre)
+            return (found, digest_timeline(found, None)) if found.readings else (None, None)
+
+        return self._written.of(words, written)
 
     def _goal(self, goal: str | dict[str, Any], frames: int, metre: float) -> tuple[Goal, str]:
         """A goal and its hash; rows with the same goal share it."""
@@ -305,12 +301,12 @@ class Sources:
 
         if isinstance(goal, str):
             return self._read("goal", goal, lambda path: read(path, path.parent), frames, metre)
-        return self._written.get((json.dumps(goal), frames, metre), lambda: read(goal, self.folder))
+        return self._written.of((json.dumps(goal), frames, metre), lambda: read(goal, self.folder))
 
     def _robot(self, row: Row) -> OnRobot | None:
         """The robot that the row's motion is put on; what it does not say is as the job says."""
         own = {"max_speed": row.max_speed, "avoid_collisions": row.avoid_collisions}
-        said = {**self._limits, **{name: value for name, value in own.items() if value is not None}}
+        said = {**self.limits, **{name: value for name, value in own.items() if value is not None}}
         if row.robot is None:
             if row.robot_map is not None or (self.robot is None and any(one is not None for one in own.values())):
                 raise MotionloomError("columns about a robot go with a 'robot' of the row; name its model")
@@ -330,38 +326,26 @@ class Sources:
     def _cached(self, column: str, path: Path, read: Callable[[Path], Any], *more: Any) -> Any:
         about = path.stat()
         key = (column, str(path), about.st_size, about.st_mtime_ns, *more)
-        return self._cache.get(key, lambda: read(path))
+        return self._cache.of(key, lambda: read(path))
 
 
-class _Kept:
+class _Kept(OrderedDict[Any, tuple[Any, MotionloomError | None]]):
     """The values that were asked for last, by what they are made of; what was refused is refused again unread."""
 
-    def __init__(self) -> None:
-        self._values: OrderedDict[Any, tuple[Any, MotionloomError | None]] = OrderedDict()
-
-    def get(self, key: Any, make: Callable[[], Any]) -> Any:
+    def of(self, key: Any, make: Callable[[], Any]) -> Any:
         """The value of a key, made where it is not kept; raises what ``make`` raises."""
-        if key not in self._values:
+        if key not in self:
             try:
-                self._values[key] = make(), None
+                self[key] = make(), None
             except MotionloomError as error:
-                self._values[key] = None, error
-            if len(self._values) > _KEPT:
-                self._values.popitem(last=False)
-        self._values.move_to_end(key)
-        value, error = self._values[key]
+                self[key] = None, error
+            if len(self) > _KEPT:
+                self.popitem(last=False)
+        self.move_to_end(key)
+        value, error = self[key]
         if error is not None:
             raise error.with_traceback(None)
         return value
-
-    def clear(self) -> None:
-        """Forget all of them."""
-        self._values.clear()
-
-
-def _timeline_in(prompt: str, seconds: float | None, metre: float) -> tuple[Timeline | None, str | None]:
-    found = timeline_of(prompt, seconds, amounts=True, metre=metre)
-    return (found, digest_timeline(found, None)) if found.readings else (None, None)
 
 
 def _check_timeline(task: str, timeline: Timeline) -> None:

@@ -13,7 +13,7 @@ from motionloom.bulk import claim
 from motionloom.bulk.folder import STATES, Entry, Head, Store, digest
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.measures import Filter
-from motionloom.bulk.row import Asked, Unexpected, parse, unexpected
+from motionloom.bulk.row import Asked, Unexpected, explained, parse, unexpected
 from motionloom.bulk.writers import Writer, hashes, sizes, writer
 from motionloom.errors import MotionloomError
 
@@ -47,6 +47,10 @@ class Batch:
         """What `to_json` gave."""
         values = json.loads(line)
         return Batch(**{**values, "options": Options(**values["options"])})
+
+    def maker(self) -> Maker:
+        """What makes its rows; raises `MotionloomError` where that cannot be."""
+        return Maker(self.options, folder=Path(self.folder), weights=self.weights, pair=self.pair)
 
 
 @dataclass(frozen=True)
@@ -102,19 +106,16 @@ def make_shard(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], No
     `MotionloomError` where the folder cannot be written (a full disk), or the shard cannot be put together even with
     its rows one by one; the folder stays as it was.
     """
-    try:
+    with explained(f"shard {task.shard} cannot be put together, a fault of the program"):
         try:
-            return _attempt(task, batch, maker, moved)
-        except (OSError, MotionloomError):
-            raise
-        except Exception:  # of no row that is known: each is made by itself, so that only the one at fault fails
-            return _attempt(task, batch, maker, moved, careful=True)
-    except OSError as error:
-        raise MotionloomError(f"cannot write to {batch.out}: {error.strerror or error}") from error
-    except MotionloomError:
-        raise
-    except Exception as error:
-        raise unexpected(error, f"shard {task.shard} cannot be put together, a fault of the program") from error
+            try:
+                return _attempt(task, batch, maker, moved)
+            except (OSError, MotionloomError):
+                raise
+            except Exception:  # of no row that is known: each is made by itself, so that only the one at fault fails
+                return _attempt(task, batch, maker, moved, careful=True)
+        except OSError as error:
+            raise MotionloomError(f"cannot write to {batch.out}: {error.strerror or error}") from error
 
 
 def _attempt(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], None], *, careful: bool = False) -> Report:
@@ -231,7 +232,7 @@ class _Shard:
                     passed = made.passes(passes)
                     if passed:
                         file = file or self._writer(place)
-                        file.add(made.people, about, made.angles)
+                        file.add(made, about)
                     self.entries[number] = self._entry(number, "made" if passed else "dropped", one, **about)
                 except Exception as error:
                     if _of_disk(error):
@@ -253,15 +254,12 @@ class _Shard:
             return
         for one in asked:
             try:
-                found = list(self.maker.make([one], begin=self._begin))
+                found = list(self.maker.make([one], begin=lambda row: self.notes.note(f"row {row.key}")))
             except Exception as error:
                 if _of_disk(error):
                     raise
                 found = [(one, str(unexpected(error, "it could not be made")))]
             yield from found
-
-    def _begin(self, one: Asked) -> None:
-        self.notes.note(f"row {one.key}")
 
     def _commit(self, data: Path | None, *, same: bool, made: int) -> Report:
         shard, rows = self.task.shard, self.task.rows

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motionloom.bulk.claim import living
-from motionloom.bulk.folder import Store, read_manifest
+from motionloom.bulk.folder import find_batch
 from motionloom.bulk.metadata import damaged_table, table_shards
 from motionloom.errors import MotionloomError
 
@@ -34,12 +34,9 @@ def verify(out: Path | str) -> Verified:
     Raises `MotionloomError` for a folder that is no batch, whose manifest is damaged, or in which somebody works.
     """
     folder = Path(out)
-    manifest = read_manifest(folder)
-    if manifest is None:
-        raise MotionloomError(f"{folder} holds no batch; name a folder that 'motionloom batch' made")
+    store, of = find_batch(folder)
     if (driver := living(folder)) is not None:
         raise MotionloomError(f"{folder} is being made by {driver}; verify it when that ended")
-    store, of = Store(folder, manifest["files"]), -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
     there = set(store.shards())
     counted = min(table_shards(store), of, len(there) + MOST_LOST)
     expected = there | set(range(counted))  # a shard that the table counts and that is not there was lost

@@ -11,7 +11,6 @@ import sys
 import threading
 import warnings
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, TextIO
 
 from motionloom.errors import MotionloomError
@@ -49,13 +48,12 @@ def _listen(lines: "queue.Queue[str]", source: TextIO = sys.stdin) -> None:
 
 
 def _work(lines: "queue.Queue[str]", say: Any) -> None:
-    from motionloom.bulk.maker import Maker
     from motionloom.bulk.shard import Batch, Task, make_shard
     from motionloom.runtime import set_threads
 
     set_threads(1)  # there is a process for each core
     batch = Batch.from_json(lines.get())
-    maker = Maker(batch.options, folder=Path(batch.folder), weights=batch.weights, pair=batch.pair)
+    maker = batch.maker()
     say({"ready": True})
     while True:
         asked = json.loads(lines.get())

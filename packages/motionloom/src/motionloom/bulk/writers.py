@@ -9,7 +9,7 @@ import os
 import shutil
 import tarfile
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from motionloom.bulk.jobs import arrow, parquet
+from motionloom.bulk.maker import Made
 from motionloom.bulk.measures import MEANING, SECOND, SHARED
-from motionloom.bulk.on_robot import Save
 from motionloom.bulk.row import hash_file
 from motionloom.io import save, save_scene
 from motionloom.io.bvh_writer import save_bvh
@@ -40,9 +40,8 @@ class Writer(ABC):
         self.path = path
 
     @abstractmethod
-    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
-        """One motion, of one person or two; ``about`` has its ``id`` and what is to be known of it. angles: what writes
-        the joint angles of each, of a robot, which are kept instead."""
+    def add(self, made: Made, about: dict[str, Any]) -> None:
+        """One motion; ``about`` has its ``id`` and what is to be known of it. Of a robot its joint angles are kept."""
 
     @abstractmethod
     def carry(self, old: Path, ids: Collection[str]) -> None:
@@ -61,24 +60,24 @@ class Files(Writer):
         self.kind, self.unit = suffix, unit
         path.mkdir()
 
-    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
-        places = [self.path / name for name in file_names(about["id"], self.kind, len(people))]
+    def add(self, made: Made, about: dict[str, Any]) -> None:
+        places = [self.path / name for name in file_names(about["id"], self.kind, len(made.people))]
         try:
-            self._save(people, places, angles)
+            self._save(made, places)
         except BaseException:
             for place in places:  # all that there is of a motion, or none
                 place.unlink(missing_ok=True)
             raise
 
-    def _save(self, people: Sequence[Motion], places: Sequence[Path], angles: Sequence[Save]) -> None:
-        for write, place in zip(angles, places):
+    def _save(self, made: Made, places: Sequence[Path]) -> None:
+        for write, place in zip(made.angles, places):
             write(place)
-        if angles:
+        if made.angles:
             return
-        if len(places) < len(people):
-            save_scene(people, places[0], names=PEOPLE)
+        if len(places) < len(made.people):
+            save_scene(made.people, places[0], names=PEOPLE)
             return
-        for motion, place in zip(people, places, strict=True):
+        for motion, place in zip(made.people, places, strict=True):
             if self.kind == ".bvh":
                 save_bvh(motion, place, unit=self.unit)
             else:
@@ -104,10 +103,10 @@ class Tar(Writer):
         self._tar = tarfile.open(path, "w", format=tarfile.USTAR_FORMAT)  # noqa: SIM115
         self._part = path.with_name(f"{path.name}.npz")
 
-    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
+    def add(self, made: Made, about: dict[str, Any]) -> None:
         found = {}
-        writes = angles or [partial(save_npz, motion) for motion in people]
-        for write, name in zip(writes, file_names(about["id"], ".npz", len(people)), strict=True):
+        writes = made.angles or [partial(save_npz, motion) for motion in made.people]
+        for write, name in zip(writes, file_names(about["id"], ".npz", len(made.people)), strict=True):
             write(self._part)
             found[name] = self._part.read_bytes()
         found[f"{about['id']}.json"] = json_line(dict(sorted(about.items())))
@@ -141,8 +140,8 @@ class Parquet(Writer):
         self._rows: list[dict[str, Any]] = []
         self._file = parquet().ParquetWriter(path, parquet_schema(), compression="zstd")
 
-    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
-        self._rows.append(parquet_row(people, about))
+    def add(self, made: Made, about: dict[str, Any]) -> None:
+        self._rows.append(parquet_row(made.people, about))
         if len(self._rows) == ROWS:
             self._flush()
 
@@ -241,30 +240,29 @@ def suffix(kind: str) -> str:
 
 def sizes(path: Path) -> dict[str, int]:
     """What a shard's data must look like to be whole: files and bytes."""
-    places = [path] if path.is_file() else list(_inside(path))
+    places = _files(path)
     return {"files": len(places), "bytes": sum(place.stat().st_size for place in places)}
 
 
 def hashes(path: Path) -> dict[str, str]:
     """SHA-256 of a shard's files by their names; of a shard that is one file, that one's. Empty: it cannot be read."""
-    places = [path] if path.is_file() else list(_inside(path))
-    return {place.name if place != path else "": _hash(place) for place in sorted(places)}
-
-
-def _hash(place: Path) -> str:
-    try:
-        return hash_file(place)
-    except OSError:
-        return ""
+    found = {}
+    for place in sorted(_files(path)):
+        name = place.name if place != path else ""
+        try:
+            found[name] = hash_file(place)
+        except OSError:
+            found[name] = ""
+    return found
 
 
 def sync(path: Path) -> None:
     """Wait until a file or a folder's files are on the disk."""
-    for place in [path] if path.is_file() else list(_inside(path)):
+    for place in _files(path):
         with place.open("rb") as file:
             os.fsync(file.fileno())
 
 
-def _inside(path: Path) -> Iterator[Path]:
-    if path.is_dir():
-        yield from (place for place in path.iterdir() if place.is_file())
+def _files(path: Path) -> list[Path]:
+    """A file, or all that lie in a folder."""
+    return [place for place in (path.iterdir() if path.is_dir() else [path]) if place.is_file()]

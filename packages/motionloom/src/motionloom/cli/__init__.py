@@ -12,7 +12,7 @@ from typing import Any
 
 from motionloom.cli.commands import absence, add_commands
 from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
-from motionloom.cli.terminal import escaping
+from motionloom.cli.terminal import escaping, say
 from motionloom.errors import MotionloomError, one_line
 from motionloom.interruption import interruptible, was_interrupted
 
@@ -80,7 +80,7 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
         if not was_interrupted():
             raise
         problem, code = "interrupted", 130
-    print(f"motionloom: {problem}", file=sys.stderr)
+    say(problem)
     return code
 
 
@@ -125,4 +125,4 @@ def _seldom_collected() -> Iterator[None]:
 
 def _warn(message: Warning | str, *_: object) -> None:
     """A warning as one sentence, without the place in the source that Python would add."""
-    print(f"motionloom: {' '.join(str(message).split())}", file=sys.stderr)
+    say(" ".join(str(message).split()))

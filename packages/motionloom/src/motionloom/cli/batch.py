@@ -1,9 +1,9 @@
 """`motionloom batch`: a file of jobs to a folder of motions."""
 
-import argparse
 import json
 import sys
 import time
+from argparse import Namespace
 from collections import Counter
 from contextlib import ExitStack
 from dataclasses import fields
@@ -16,7 +16,7 @@ from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Options
 from motionloom.bulk.measures import Filter
 from motionloom.bulk.shard import Report
-from motionloom.cli.terminal import escaping, unescaped
+from motionloom.cli.terminal import escaping, note, say, unescaped
 from motionloom.cli.writing import fail
 from motionloom.runtime import set_threads
 
@@ -29,7 +29,7 @@ SHORTEST = 3.0
 """Seconds over which a rate is measured at least: rows come several at a time."""
 
 
-def run_batch(arguments: argparse.Namespace) -> int:
+def run_batch(arguments: Namespace) -> int:
     """``motionloom batch JOBS --out FOLDER``; exit code 0 where every row was made or dropped, else 1.
 
     ``--verify FOLDER``: 2 where something is damaged.
@@ -42,8 +42,8 @@ def run_batch(arguments: argparse.Namespace) -> int:
     options, where, jobs = _options(arguments), _where(arguments), _jobs(arguments)
     check_options(options)
     robot = options.on_robot()
-    for note in () if robot is None else robot.robot.remarks():
-        print(f"note: {note}", file=sys.stderr)
+    for remark in () if robot is None else robot.robot.remarks():
+        note(remark)
     rows = jobs.count()
     check_jobs(jobs, rows)
     if arguments.dry_run:
@@ -52,7 +52,7 @@ def run_batch(arguments: argparse.Namespace) -> int:
     return _make(arguments, jobs, options, where=where, rows=rows)
 
 
-def _verify(arguments: argparse.Namespace) -> int:
+def _verify(arguments: Namespace) -> int:
     from motionloom.bulk.verify import verify
 
     if any(one is not None for one in (arguments.jobs, arguments.prompts, arguments.recordings, arguments.out)):
@@ -76,7 +76,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _jobs(arguments: argparse.Namespace) -> Jobs:
+def _jobs(arguments: Namespace) -> Jobs:
 
     given = [one for one in (arguments.jobs, arguments.prompts, arguments.recordings) if one is not None]
     if len(given) != 1:
@@ -90,7 +90,7 @@ def _jobs(arguments: argparse.Namespace) -> Jobs:
     return Jobs.of(arguments.jobs)
 
 
-def _options(arguments: argparse.Namespace) -> Options:
+def _options(arguments: Namespace) -> Options:
 
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     if obeys:
@@ -106,7 +106,7 @@ def _options(arguments: argparse.Namespace) -> Options:
     )
 
 
-def _where(arguments: argparse.Namespace) -> Where:
+def _where(arguments: Namespace) -> Where:
 
     if arguments.workers is not None and not 1 <= arguments.workers <= 10_000:
         fail(f"--workers must be 1 to 10000; got {arguments.workers}")
@@ -122,7 +122,7 @@ def _where(arguments: argparse.Namespace) -> Where:
     return Where(arguments.workers, (int(first), int(count)))
 
 
-def _estimate(arguments: argparse.Namespace, jobs: Jobs, options: Options, where: Where) -> None:
+def _estimate(arguments: Namespace, jobs: Jobs, options: Options, where: Where) -> None:
 
     set_threads(1)
     found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
@@ -139,7 +139,7 @@ def _estimate(arguments: argparse.Namespace, jobs: Jobs, options: Options, where
         print(f"{found.usable:.0%} of the rows looked at would be kept")
 
 
-def _make(arguments: argparse.Namespace, jobs: Jobs, options: Options, *, where: Where, rows: int) -> int:
+def _make(arguments: Namespace, jobs: Jobs, options: Options, *, where: Where, rows: int) -> int:
 
     counts: Counter[str] = Counter()
     problems: list[str] = []
@@ -154,7 +154,7 @@ def _make(arguments: argparse.Namespace, jobs: Jobs, options: Options, *, where:
             problems += report.problems[: SHOWN - len(problems)]
             progress.done(report)
     for problem in problems:
-        print(f"motionloom: {problem}", file=sys.stderr)
+        say(problem)
     if arguments.json:
         print(json.dumps({"folder": str(arguments.out), "tried": made, **counts}, indent=1))
     else:
@@ -164,17 +164,14 @@ def _make(arguments: argparse.Namespace, jobs: Jobs, options: Options, *, where:
 
 def _say(out: Path, counts: dict[str, int], made: int) -> None:
     said = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
-    said += [f"{counts['dropped']:,} were dropped by the filter"] if counts["dropped"] else []
-    said += (
-        [f"{counts['repeated']:,} {'row repeats' if counts['repeated'] == 1 else 'rows repeat'} another"]
-        if counts["repeated"]
-        else []
-    )
-    said += (
-        [f"{counts['failed']:,} failed (rows are counted from 0; correct them and run the same command again)"]
-        if counts["failed"]
-        else []
-    )
+    if counts["dropped"]:
+        said.append(f"{counts['dropped']:,} were dropped by the filter")
+    if counts["repeated"]:
+        said.append(f"{counts['repeated']:,} {'row repeats' if counts['repeated'] == 1 else 'rows repeat'} another")
+    if counts["failed"]:
+        said.append(
+            f"{counts['failed']:,} failed (rows are counted from 0; correct them and run the same command again)"
+        )
     print(("nothing was left to make: " if counts["made"] and not made else "") + ", ".join(said))
 
 

@@ -1,6 +1,7 @@
 """`motionloom completion`: what a shell needs to complete commands, options and file names."""
 
 import argparse
+from argparse import Namespace
 
 _BASH = """_motionloom() {{
     local word=${{COMP_WORDS[COMP_CWORD]}} command=${{COMP_WORDS[1]}} words=""
@@ -19,7 +20,7 @@ complete -o filenames -F _motionloom motionloom
 """
 
 
-def run_completion(arguments: argparse.Namespace) -> None:
+def run_completion(arguments: Namespace) -> None:
     """``motionloom completion SHELL``."""
     from motionloom.cli import commands_of, parser
 

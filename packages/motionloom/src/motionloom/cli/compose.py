@@ -1,28 +1,36 @@
 """`motionloom compose`: a long motion from a timeline file or from several prompts."""
 
-import argparse
 import json
-import sys
+from argparse import Namespace
 from collections.abc import Generator, Iterable, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from motionloom.cli.looping import check_loop
 from motionloom.cli.reading import load_motion
 from motionloom.cli.robots import note_on_metres
-from motionloom.cli.sampling import check_outs, fail, load_prior, remark_unknown, request_of, results
-from motionloom.cli.skeletons import Target, open_target
+from motionloom.cli.sampling import (
+    check_loop,
+    check_outs,
+    fail,
+    load_prior,
+    remark_unknown,
+    request_of,
+    results,
+    segment_rows,
+    write_pieces,
+)
+from motionloom.cli.skeletons import Target
+from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
 from motionloom.errors import MotionloomError
 from motionloom.goals.timeline import Timeline
-from motionloom.interruption import held_back
-from motionloom.io.stream import Stream, check_length, open_stream, resampled
-from motionloom.kinematics.deeds import LONGEST
+from motionloom.io.stream import Stream, resampled
+from motionloom.kinematics.deeds import LONGEST, happened
 from motionloom.motion import Motion
-from motionloom.requests.compose import Compose
 from motionloom.requests.reading import resolve_sampling
+from motionloom.requests.tasks import Compose
 from motionloom.tasks.long import load_segment_adapters
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.splice import concatenate
@@ -34,13 +42,12 @@ SHOWN = 40
 """Segments listed at the end; --json lists all."""
 
 
-def run_compose(arguments: argparse.Namespace) -> int:
+def run_compose(arguments: Namespace) -> int:
     """``motionloom compose PROMPT PROMPT``."""
-    outs, target = ([], None) if arguments.check else check_outs(arguments)
-    metre = 1.0 if target is None else target.metre
-    timeline = _timeline(arguments, metre)
-    if metre != 1.0 and timeline.asks:
-        print(f"note: {note_on_metres(metre)}", file=sys.stderr)
+    outs, target = ([], Target()) if arguments.check else check_outs(arguments)
+    timeline = _timeline(arguments, target.metre)
+    if target.metre != 1.0 and timeline.asks:
+        note(note_on_metres(target.metre))
     if arguments.check:
         _report(arguments, timeline, seconds=timeline.seconds, streams=[])
         return 0
@@ -54,14 +61,15 @@ def run_compose(arguments: argparse.Namespace) -> int:
     shown: list[Motion] = []
     interrupted = _make(arguments, prior, timeline, streams, shown)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
-    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks, happened=_happened(shown))
+    did = happened([concatenate(*shown)] if shown else [])
+    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks, happened=did)
     if interrupted:
-        print(f"motionloom: interrupted; {_finished_files(streams)} of {timeline.seconds:.2f} s", file=sys.stderr)
+        say(f"interrupted; {_finished_files(streams)} of {timeline.seconds:.2f} s")
         return 130
     return 0
 
 
-def _timeline(arguments: argparse.Namespace, metre: float) -> Timeline:
+def _timeline(arguments: Namespace, metre: float) -> Timeline:
     """What is asked, whether in a file or on the command line. metre: as of `Target.metre`."""
     from motionloom.goals import timeline
 
@@ -77,31 +85,17 @@ def _timeline(arguments: argparse.Namespace, metre: float) -> Timeline:
     return timeline.read_timeline(files[0], metre)
 
 
-def _open(
-    arguments: argparse.Namespace, outs: Sequence[Path], timeline: Timeline, target: Target | None
-) -> list[Stream]:
+def _open(arguments: Namespace, outs: Sequence[Path], timeline: Timeline, target: Target) -> list[Stream]:
     """The files, those that grow on the disk last: they are closed first, and that is quick."""
-
-    rate, unit = arguments.fps or 20.0, arguments.out_unit or 1.0
+    rate = arguments.fps or 20.0
     total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
     said = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
-    if target is not None:
-        for out in outs:
-            check_length(out, total=total, fps=rate, joints=len(target.skeleton))
-        return [open_target(target, out, caption=said) for out in outs]
-    streams = [open_stream(out, total=total, fps=rate, caption=said, unit=unit) for out in outs]
-    return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
-
-
-def _happened(pieces: Sequence[Motion]) -> list[Any]:
-    """What the person of these pieces did, if there are any."""
-    from motionloom.kinematics.deeds import happened
-
-    return happened([concatenate(*pieces)] if pieces else [])
+    streams = [target.open(out, total=total, fps=rate, caption=said) for out in outs]
+    return sorted(streams, key=lambda stream: target.skeleton is None and stream.path.suffix.lower() == ".bvh")
 
 
 def _make(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     prior: Prior,
     timeline: Timeline,
     streams: Sequence[Stream],
@@ -109,18 +103,15 @@ def _make(
 ) -> bool:
     """Write the motion; true if it was interrupted after something was finished.
 
-    ``shown`` gets its pieces where what happened is told: of a motion that is not too long for that.
+    ``shown`` gets its pieces where what happened is reported: of a motion that is not too long for that.
     """
-
-    told = arguments.json and timeline.seconds <= LONGEST
+    described = arguments.json and timeline.seconds <= LONGEST
 
     try:
         with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is said
-            _write(_kept_in(shown, pieces) if told else pieces, streams, arguments.fps)
+            pieces = _kept_in(shown, pieces) if described else pieces
+            write_pieces(pieces if arguments.fps is None else resampled(pieces, arguments.fps), streams)
     except KeyboardInterrupt:
-        with held_back():  # it may have come just before they were closed
-            for stream in streams:
-                stream.close()
         if not _saved(streams):
             raise
         return True
@@ -139,18 +130,7 @@ def _kept_in(shown: list[Motion], pieces: Iterable[Motion]) -> Generator[Motion,
         shown.append(piece)
 
 
-def _write(pieces: Iterable[Motion], streams: Sequence[Stream], fps: float | None) -> None:
-
-    with ExitStack() as stack:
-        for stream in streams:
-            stack.enter_context(stream)
-        for piece in pieces if fps is None else resampled(pieces, fps):
-            with held_back():  # all files end with the same piece
-                for stream in streams:
-                    stream.write(piece)
-
-
-def _pieces(arguments: argparse.Namespace, prior: Prior, timeline: Timeline) -> Generator[Motion, None, None]:
+def _pieces(arguments: Namespace, prior: Prior, timeline: Timeline) -> Generator[Motion, None, None]:
 
     values = request_of(arguments, Compose, {"timeline": timeline})
     plan = Plan(
@@ -174,7 +154,7 @@ def _finished_files(streams: Sequence[Stream]) -> str:
 
 
 def _report(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     timeline: Timeline,
     *,
     seconds: float,
@@ -183,12 +163,7 @@ def _report(
     happened: Sequence[Any] = (),
 ) -> None:
     """Print what was made and where each segment lies in it, as far as it was made."""
-    begins = [frame / 20 for frame in timeline.begins]
-    rows = [
-        {"begin": begin, "end": min(end, seconds), "text": segment.text}
-        for begin, end, segment in zip(begins, begins[1:], timeline.segments, strict=False)
-        if begin < seconds
-    ]
+    rows = [row | {"end": min(row["end"], seconds)} for row in segment_rows(timeline) if row["begin"] < seconds]
     if arguments.json:
         files = [str(stream.path) for stream in streams]
         about = {"seconds": seconds, "of": timeline.seconds, "files": files, "segments": rows}

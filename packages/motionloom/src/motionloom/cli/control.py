@@ -1,36 +1,38 @@
 """`motionloom control`: words and goals to motion files."""
 
-import argparse
-import sys
+from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from motionloom.cli.finished import Finished, finished_motions
-from motionloom.cli.looping import check_loop, note_loop
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.reading import load_motion
 from motionloom.cli.robots import note_on_metres
 from motionloom.cli.sampling import (
+    Finished,
+    check_loop,
     check_outs,
     check_prompt,
     fail,
+    finished_motions,
     load_prior,
+    note_loop,
     places,
     remark_unknown,
     report,
     request_of,
     results,
 )
+from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
 from motionloom.errors import quoted
 from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.goal_file import follow, read_goal
 from motionloom.goals.reach import check_reach
 from motionloom.motion import Motion
-from motionloom.requests.control import Control
+from motionloom.requests.tasks import Control
 from motionloom.tasks.control import Adapters, Controlled
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
@@ -38,7 +40,7 @@ from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
 
 
-def run_control(arguments: argparse.Namespace) -> int:
+def run_control(arguments: Namespace) -> int:
     """``motionloom control PROMPT --goal FILE``."""
 
     outs, target = check_outs(arguments)
@@ -48,20 +50,17 @@ def run_control(arguments: argparse.Namespace) -> int:
     if arguments.prompt is None:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
-    files = places(outs, arguments.count, target=target)
-    metre = 1.0 if target is None else target.metre
+    files, metre = places(outs, arguments.count, target), target.metre
     goal = _goal(arguments, metre)
     if metre != 1.0:
-        print(f"note: {_note_on_path(goal, metre)}", file=sys.stderr)
+        note(_note_on_path(goal, metre))
     if arguments.loop:
         check_loop(arguments, len(goal.positions) / FPS)
         note_loop(arguments, "goals there are not kept")
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
-    made = finished_motions(
-        files, [arguments.prompt] * arguments.count, target, unit=arguments.out_unit, rate=arguments.fps
-    )
+    made = finished_motions(files, [arguments.prompt] * arguments.count, target, arguments.fps)
     values, judged = request_of(arguments, Control, {"goals": goal}), []
     plan = Plan(
         task="control",
@@ -94,7 +93,7 @@ def _note_on_path(goal: Goal, metre: float) -> str:
     return f"goals are in the robot's metres: {gone}"
 
 
-def _goal(arguments: argparse.Namespace, metre: float) -> Goal:
+def _goal(arguments: Namespace, metre: float) -> Goal:
     """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a clip that
     is followed is the person's anyway."""
 
@@ -147,7 +146,7 @@ def _adapters(names: list[str], prior: Prior) -> Adapters:
 
 
 def _report(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     judged: list[Controlled],
     written: list[list[Path]],
     *,
@@ -158,7 +157,7 @@ def _report(
     for number, one in enumerate(judged):
         which = f"motion {number} (seed {arguments.seed + number}): " if len(judged) > 1 else ""
         for sentence in one.missed:
-            print(f"motionloom: {which}{sentence}", file=sys.stderr)
+            say(f"{which}{sentence}")
     if arguments.json:
         motions = [
             {

@@ -1,15 +1,15 @@
 """`motionloom duet`: two people from words, going on from their past, reacting to somebody, or through a timeline."""
 
-import argparse
-import sys
+from argparse import Namespace
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from motionloom.cli.finished import Finished
 from motionloom.cli.reading import crop, note_rate, read_clip
 from motionloom.cli.robots import note_on_metres
 from motionloom.cli.sampling import (
+    Finished,
     check_prompt,
     fail,
     load_prior,
@@ -19,7 +19,7 @@ from motionloom.cli.sampling import (
     results,
 )
 from motionloom.cli.skeletons import Target, own_outs, read_target
-from motionloom.cli.two_bodies import two_body_measures, two_body_remarks
+from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters, writable
@@ -28,18 +28,17 @@ from motionloom.goals.goal_file import read_goal
 from motionloom.goals.remarks import remarks_on_two
 from motionloom.goals.roles import prompts_of
 from motionloom.goals.timeline import Timeline, read_timeline
-from motionloom.io import save, save_scene
-from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.lined_yaml import fail as fail_at
 from motionloom.io.lined_yaml import read_lined
 from motionloom.io.stream import check_length
+from motionloom.kinematics.capsules import DEEP, overlap, trunk_distance, wrist_distance
 from motionloom.motion import MAX_POSES, Motion
-from motionloom.requests.duet import Duet
 from motionloom.requests.reading import resolve_sampling
+from motionloom.requests.tasks import Duet
+from motionloom.retarget import joints22
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 MAX_SECONDS = 3600.0
 """Of a timeline."""
@@ -51,30 +50,31 @@ REMARKED = 64
 """Segments of a timeline whose words are remarked on."""
 
 
-def run_duet(arguments: argparse.Namespace) -> int:
+def run_duet(arguments: Namespace) -> int:
     """``motionloom duet``."""
 
     _check(arguments)
-    outs, skin = check_pair_outs(arguments)
-    files = places(outs, arguments.count, sheets=False, target=skin)
+    outs, target = check_pair_outs(arguments)
+    files = places(outs, arguments.count, target, sheets=False)
     check_overwriting(arguments, [file for several in files for file in several])
-    metre = 1.0 if skin is None else skin.metre
+    metre = target.metre
     timeline = _timeline(arguments, metre) if arguments.timeline else None
     goals = _goals(arguments, metre)
     if metre != 1.0 and (any(goals) or (timeline is not None and timeline.asks)):
-        print(f"note: {note_on_metres(metre)}", file=sys.stderr)
-    given, manners = _read(arguments)
+        note(note_on_metres(metre))
+    given, written_as = _read(arguments, target)
     _check_sizes(arguments, files, given, timeline)
-    prior, block = _load(arguments)
-    remarks = _remarks_on_words(prior, block, _texts(arguments, timeline))
+    prior = load_prior(arguments)
+    block = PairBlock.load(arguments.pair_weights, prior)
+    said = remarks_on_two(_texts(arguments, timeline), block.known, prior.known, prior.text)
+    remarks = _printed([one.line for one in said])
     caption = _caption(arguments, timeline)
 
     def write(duets: Sequence[list[Motion]], places: list[list[Path]], first: int) -> None:
-        write_pairs(duets, places, manners, caption, skin)
+        write_pairs(duets, places, written_as, caption)
 
     def put(duets: Sequence[list[Motion]]) -> list[list[Motion]]:
-        rated = [at_rate(duet, arguments.fps) for duet in duets]
-        return rated if skin is None else [skin.put_together(duet) for duet in rated]
+        return [target.put_together(at_rate(duet, arguments.fps)) for duet in duets]
 
     made = Finished(files, arguments.count, write, put, what="duets")
     seconds = 0.0
@@ -85,7 +85,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
         plan = _plan(arguments, given, timeline, goals)
         for one in results("drawing two people", plan, Models(prior, block)):
             seconds = one.people[0].seconds
-            measures.append(two_body_measures(one.people))
+            measures.append(_measures(one.people))
             yield [list(one.people)]
 
     interrupted = made.take(drawn(), measured=arguments.json)
@@ -93,7 +93,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
     about |= {
         "measures": measures[: made.count],
         "happened": made.happened,
-        "remarks": remarks + _printed(two_body_remarks(measures[: made.count])),
+        "remarks": remarks + _printed(_remarks(measures[: made.count])),
     }
     report(arguments, about, made.written, made.sampling)
     note_rate(arguments, _inputs(arguments))
@@ -101,13 +101,11 @@ def run_duet(arguments: argparse.Namespace) -> int:
 
 
 def _plan(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     given: list[Motion],
     timeline: Timeline | None,
     goals: tuple[Goal | None, Goal | None],
 ) -> Plan:
-    """What is asked, with what was read."""
-
     values = request_of(arguments, Duet, {"prompt": arguments.text, "person": arguments.person - 1})
     usual = ADDED if arguments.past else SECONDS
     return Plan(
@@ -124,34 +122,24 @@ def _plan(
 # What is read
 
 
-def _load(arguments: argparse.Namespace) -> tuple[Prior, PairBlock]:
-
-    prior = load_prior(arguments)
-    return prior, PairBlock.load(arguments.pair_weights, prior)
-
-
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
+def _inputs(arguments: Namespace) -> list[Path]:
     return list(arguments.past or ([arguments.react_to] if arguments.react_to else []))
 
 
-def _read(arguments: argparse.Namespace) -> tuple[list[Motion], list[tuple[float, dict[str, str]]]]:
-    """Motions that are given, and how their own files say numbers."""
+def _read(arguments: Namespace, target: Target) -> tuple[list[Motion], list[Target]]:
+    """Motions that are read, and what each of the two people becomes."""
     paths = _inputs(arguments)
     if len({path.resolve() for path in paths}) < len(paths):
         fail(f"{paths[0]} is named twice as the past; give the motion of each person")
-    motions, manners = [], []
+    motions, targets = [], []
     for path in paths:
         motion, unit, orders = read_clip(arguments, path)
         motions.append(crop(motion, arguments))
-        manners.append((arguments.out_unit or unit or 1.0, orders))
-    if not paths:
-        manners = [(arguments.out_unit or 1.0, {})] * 2
-    elif len(paths) == 1:
-        manners.append((arguments.out_unit or 1.0, {}))
-    return motions, manners
+        targets.append(target.like(unit, orders))
+    return motions, [*targets, target, target][:2]
 
 
-def _timeline(arguments: argparse.Namespace, metre: float) -> Timeline:
+def _timeline(arguments: Namespace, metre: float) -> Timeline:
 
     path = arguments.timeline
     timeline = read_timeline(path, metre)
@@ -172,7 +160,7 @@ def _timeline(arguments: argparse.Namespace, metre: float) -> Timeline:
     return timeline
 
 
-def _goals(arguments: argparse.Namespace, metre: float) -> tuple[Goal | None, Goal | None]:
+def _goals(arguments: Namespace, metre: float) -> tuple[Goal | None, Goal | None]:
     """What the first and what the second is asked."""
     asked = [_goal(arguments, path, metre) for path in arguments.path or ()]
     if len(asked) == 2:
@@ -181,7 +169,7 @@ def _goals(arguments: argparse.Namespace, metre: float) -> tuple[Goal | None, Go
     return (goal, None) if arguments.person == 1 else (None, goal)
 
 
-def _goal(arguments: argparse.Namespace, path: Path, metre: float) -> Goal:
+def _goal(arguments: Namespace, path: Path, metre: float) -> Goal:
     """What somebody is asked: a goal file, such a mapping in YAML, or a drawn line."""
 
     frames = frames_in(SECONDS if arguments.seconds is None else arguments.seconds, FPS)
@@ -205,7 +193,7 @@ def _goal(arguments: argparse.Namespace, path: Path, metre: float) -> Goal:
 # What cannot be asked
 
 
-def _check(arguments: argparse.Namespace) -> None:
+def _check(arguments: Namespace) -> None:
     kinds = [name for name in ("past", "react-to", "timeline") if getattr(arguments, name.replace("-", "_"))]
     if len(kinds) > 1:
         fail(f"--{kinds[0]} and --{kinds[1]} are different tasks; give one of them")
@@ -226,32 +214,29 @@ def _check(arguments: argparse.Namespace) -> None:
     check_rate(arguments)
 
 
-def check_pair_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
-    """The files to write, those of one person in twos of a kind, first that of the first person; and the skeleton."""
+def check_pair_outs(arguments: Namespace) -> tuple[list[Path], Target]:
+    """The files to write, those of one person in twos of a kind, first that of the first person; and their target."""
     outs = arguments.out or [Path("duet.glb")]
     if not arguments.out and Path(arguments.skeleton or "").suffix.lower() in characters():
         outs = [out for name in ("duet_a", "duet_b") for out in own_outs(arguments, name)]
-    skin = read_target(arguments, outs)
-    if skin is not None:
-        skin.names(["first", "second"])
+    target = read_target(arguments, outs)
+    target.names(["first", "second"])
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
     check_unit(arguments, outs)
-    for suffix in _single(skin):
+    for suffix in _single(target):
         own = [out for out in outs if out.suffix.lower() == suffix]
         if len(own) not in (0, 2):
             fail(f"a {suffix} file holds one person: give two, such as --out a{suffix} --out b{suffix}; got {len(own)}")
-    return outs, skin
+    return outs, target
 
 
-def _single(skin: Target | None) -> tuple[str, ...]:
+def _single(target: Target) -> tuple[str, ...]:
     """The suffixes of files that hold one person; a character's own file does."""
-    return SINGLE if skin is None else tuple(dict.fromkeys((*SINGLE, *skin.suffixes)))
+    return tuple(dict.fromkeys((*SINGLE, *target.suffixes)))
 
 
-def _check_sizes(
-    arguments: argparse.Namespace, files: list[list[Path]], given: list[Motion], timeline: Timeline | None
-) -> None:
+def _check_sizes(arguments: Namespace, files: list[list[Path]], given: list[Motion], timeline: Timeline | None) -> None:
     """Refuse what no file or memory holds, before any work."""
 
     if timeline is None and not given:
@@ -269,28 +254,19 @@ def _check_sizes(
 # What is written and reported
 
 
-def _texts(arguments: argparse.Namespace, timeline: Timeline | None) -> list[str]:
+def _texts(arguments: Namespace, timeline: Timeline | None) -> list[str]:
     """What the two are asked in words."""
     said = [arguments.text or ""] if timeline is None else [segment.text for segment in timeline.segments[:REMARKED]]
     return [text for text in dict.fromkeys(said) if text.strip()]
 
 
-def _remarks_on_words(prior: Prior, block: PairBlock, texts: list[str]) -> list[str]:
-    """Say how the words were read, and which of them neither the prior nor the block has learned; and give the lines.
-
-    Of a block whose file has no table of what it knows nothing is said.
-    """
-
-    return _printed([one.line for one in remarks_on_two(texts, block.known, prior.known, prior.text)])
-
-
 def _printed(lines: list[str]) -> list[str]:
     for line in lines:
-        print(f"motionloom: {line}", file=sys.stderr)
+        say(line)
     return lines
 
 
-def _caption(arguments: argparse.Namespace, timeline: Timeline | None) -> str:
+def _caption(arguments: Namespace, timeline: Timeline | None) -> str:
     if timeline is not None:
         return "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
     return arguments.text or " and ".join(path.stem for path in _inputs(arguments))
@@ -299,36 +275,25 @@ def _caption(arguments: argparse.Namespace, timeline: Timeline | None) -> str:
 def write_pairs(
     duets: Sequence[list[Motion]],
     files: list[list[Path]],
-    manners: list[tuple[float, dict[str, str]]],
+    targets: Sequence[Target],
     caption: str,
-    skin: Target | None,
 ) -> list[Path]:
     """All files, duet by duet; a person whose motion came from a BVH file keeps its unit and orders."""
-
-    written = []
+    written, names, single = [], targets[0].names([caption] * 2), _single(targets[0])
     for number, duet in enumerate(duets):
-        seen: dict[str, int] = {}
+        seen: Counter[str] = Counter()
         for out in (several[number] for several in files):
             suffix = out.suffix.lower()
-            if skin is not None and skin.plays_in(out):
-                written.append(skin.save_page([(caption, duet)], out))
+            if suffix not in single:
+                written.append(targets[0].save_together(duet, out, caption))
                 continue
-            if suffix not in _single(skin):
-                written.append(save_scene(duet, out, names=["first", "second"], captions=[caption] * 2))
-                continue
-            person = seen.setdefault(suffix, 0)
+            person = seen[suffix]
             seen[suffix] += 1
-            if skin is not None:
-                written.append(skin.save(duet[person], out, caption=skin.names([caption] * 2)[person]))
-            elif suffix == ".bvh":
-                unit, orders = manners[person]
-                written.append(save_bvh(duet[person], out, order=orders, unit=unit))
-            else:
-                written.append(save(duet[person], out))
+            written.append(targets[person].save(duet[person], out, caption=names[person]))
     return written
 
 
-def _about(arguments: argparse.Namespace, count: int, seconds: float) -> dict[str, Any]:
+def _about(arguments: Namespace, count: int, seconds: float) -> dict[str, Any]:
     return {
         "prompt": arguments.text,
         "past": [str(path) for path in arguments.past or ()],
@@ -340,3 +305,29 @@ def _about(arguments: argparse.Namespace, count: int, seconds: float) -> dict[st
         "weights": str(arguments.weights),
         "block": str(arguments.pair_weights),
     }
+
+
+def _measures(duet: Sequence[Motion]) -> dict[str, float]:
+    """How near the two bodies and their hands come, and how deep and in how many frames they are in each other."""
+
+    first, second = (joints22(person) for person in duet)
+    apart, depth = trunk_distance(first, second), overlap(first, second)
+    hands = wrist_distance(first, second)
+    return {
+        "least_trunk_distance": round(float(apart.min()), 4),
+        "trunk_distance": round(float(sorted(apart)[len(apart) // 2]), 4),
+        "deepest_overlap": round(float(depth.max()), 4),
+        "overlapping_frames": int((depth > DEEP).sum()),
+        "least_wrist_distance": round(float(hands.min()), 4),
+        "least_wrist_distance_at": round(float(hands.argmin()) / duet[0].fps, 3),
+    }
+
+
+def _remarks(measures: Sequence[dict[str, float]]) -> list[str]:
+    """A sentence for each duet whose bodies are in each other."""
+    return [
+        f"{f'duet {number}: ' if len(measures) > 1 else ''}the two are in each other by "
+        f"{100 * one['deepest_overlap']:.0f} cm in {one['overlapping_frames']} frames"
+        for number, one in enumerate(measures, 1)
+        if one["overlapping_frames"]
+    ]

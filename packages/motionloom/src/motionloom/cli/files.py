@@ -1,8 +1,7 @@
 """Commands about motion files: export, view, info."""
 
-import argparse
 import json
-import sys
+from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,8 +16,8 @@ from motionloom.cli.reading import (
 )
 from motionloom.cli.robots import check_inputs
 from motionloom.cli.skeletons import Target, read_target
-from motionloom.cli.writing import at_rate, check_overwriting, check_rate
-from motionloom.errors import MotionloomError
+from motionloom.cli.terminal import note
+from motionloom.cli.writing import at_rate, check_overwriting, check_rate, fail
 from motionloom.formats import find
 from motionloom.io import GLTF
 from motionloom.io.bvh import save_bvh, unit_that_reads_back
@@ -28,79 +27,68 @@ from motionloom.kinematics.deeds import measure_deeds
 from motionloom.motion import Motion
 
 
-def run_export(arguments: argparse.Namespace) -> int:
+def run_export(arguments: Namespace) -> int:
     """``motionloom export IN OUT``."""
 
     if arguments.check:
         return check_inputs(arguments)
-    arguments.inputs, target = _files(arguments)
-    skin = read_target(arguments, [target])
-    io.check_output(target, own=skin and skin.suffix)
-    if len(arguments.inputs) > 1 and (skin is None or not skin.writes(target)):
-        raise MotionloomError(
+    arguments.inputs, out = _files(arguments)
+    target = read_target(arguments, [out])
+    io.check_output(out, own=target.suffix)
+    if len(arguments.inputs) > 1 and not target.writes(out):
+        fail(
             f"{len(arguments.inputs)} motions go into one file as animations of a character: --skeleton hero.glb "
             "--out moving.glb; else export one at a time"
         )
-    read = [_exported(arguments, path, skin) for path in arguments.inputs]
-    check_overwriting(arguments, [target])
-    if arguments.source_map and not skin:
-        raise MotionloomError("--source-map says which joints are which for a --skeleton; name one")
-    _write(arguments, target, skin, read)
-    held = (skin and skin.summary()) or "; ".join(_summary(motion) for motion, _, _ in read)
-    print(f"wrote {target}: {held}")
+    read = [_exported(arguments, path, target) for path in arguments.inputs]
+    check_overwriting(arguments, [out])
+    if arguments.source_map and target.skeleton is None:
+        fail("--source-map says which joints are which for a --skeleton; name one")
+    _write(arguments, out, read)
+    held = target.summary() or "; ".join(_summary(motion) for motion, _ in read)
+    print(f"wrote {out}: {held}")
     note_rate(arguments, arguments.inputs)
     return 0
 
 
-def _write(
-    arguments: argparse.Namespace,
-    target: Path,
-    skin: Target | None,
-    read: list[tuple[Motion, float | None, dict[str, str]]],
-) -> None:
+def _write(arguments: Namespace, out: Path, read: list[tuple[Motion, Target]]) -> None:
     """Write what was read; several motions into a character's own file."""
-
-    names = None if skin is None else skin.names([path.stem for path in arguments.inputs])
-    motions = [motion for motion, _, _ in read]
-    motion, unit, orders = read[0]
-    if skin and names and skin.writes(target):
-        _only_bvh(arguments, target)
-        skin.save_clips(motions, target, names)
-    elif target.suffix.lower() == ".bvh":
-        motion = motion if skin is None else skin.shown(motion, target)
-        chosen = arguments.out_unit or unit_that_reads_back(motion, unit or 1.0)
+    motion, target = read[0]
+    names = target.names([path.stem for path in arguments.inputs])
+    if out.suffix.lower() != ".bvh" and (arguments.out_unit or arguments.order):
+        fail(f"--out-unit and --order are for BVH files; {out} is none")
+    if target.writes(out):
+        target.save_clips([motion for motion, _ in read], out, names)
+    elif out.suffix.lower() == ".bvh":
+        motion = target.shown(motion, out)
+        chosen = arguments.out_unit or unit_that_reads_back(motion, target.unit or 1.0)
         if unit_that_reads_back(motion, chosen) != chosen:
-            print(f"note: give --unit {chosen:g} to read {target} at this size: bones do not show it", file=sys.stderr)
-        save_bvh(motion, target, order=arguments.order or orders, unit=chosen)
+            note(f"give --unit {chosen:g} to read {out} at this size: bones do not show it")
+        save_bvh(motion, out, order=arguments.order or target.orders, unit=chosen)
     else:
-        _only_bvh(arguments, target)
-        (io.save if skin is None else skin.save)(motion, target)
+        target.save(motion, out)
 
 
-def _exported(
-    arguments: argparse.Namespace, path: Path, skin: Target | None
-) -> tuple[Motion, float | None, dict[str, str]]:
-    """A motion as it is to be written, and the unit and the orders of rotations of a BVH."""
+def _exported(arguments: Namespace, path: Path, target: Target) -> tuple[Motion, Target]:
+    """A motion as it is to be written, and its target."""
     motion, unit, orders = read_clip(arguments, path)
-    if skin is None:
+    if target.skeleton is None:
         check_size(arguments, path, motion)
     motion = crop(motion, arguments)
     if arguments.mirror:
         motion = motion.mirror()
-    if skin:
-        unit, orders = skin.unit, skin.orders
-        motion = skin.put(motion, source=str(path), source_map=arguments.source_map)
-    return motion if arguments.fps is None else motion.resample(arguments.fps), unit, orders
+    motion = target.put(motion, source=str(path), source_map=arguments.source_map)
+    return motion if arguments.fps is None else motion.resample(arguments.fps), target.like(unit, orders)
 
 
-def run_view(arguments: argparse.Namespace) -> None:
+def run_view(arguments: Namespace) -> None:
     """``motionloom view FILE ...``."""
 
     target = arguments.out or Path(f"{arguments.inputs[0].stem}.png")
     if target.suffix.lower() not in (".png", ".mp4", ".gif", ".html"):
-        raise MotionloomError(f"a picture ends in .png, a film in .mp4 or .gif and a page in .html; got {target}")
+        fail(f"a picture ends in .png, a film in .mp4 or .gif and a page in .html; got {target}")
     if arguments.skeleton and target.suffix.lower() != ".html":
-        raise MotionloomError(f"--skeleton is for a page, an .html; got {target}")
+        fail(f"--skeleton is for a page, an .html; got {target}")
     io.check_output(target)
     check_rate(arguments)
     check_overwriting(arguments, [target])
@@ -113,43 +101,36 @@ def run_view(arguments: argparse.Namespace) -> None:
     note_rate(arguments, arguments.inputs)
 
 
-def _write_page(arguments: argparse.Namespace, target: Path) -> None:
+def _write_page(arguments: Namespace, out: Path) -> None:
     """A take for each file, with everybody in it, on the character that the line names."""
     from motionloom.viz.page import MAX_BYTES, Take, write_page
 
-    character, put = None, None
+    character, target = None, Target()
     if arguments.skeleton is not None:
         character = io.open_character(arguments.skeleton)
-        put = Target(arguments.skeleton, character.skeleton, character=character)
+        target = Target(arguments.skeleton, character.skeleton, character=character)
     takes = []
     for path in arguments.inputs:
-        motions = at_rate((crop(motion, arguments) for motion in _people(arguments, path)), arguments.fps)
-        if put is not None:
-            motions = [put.put(motions[0], source=str(path))] if len(motions) == 1 else put.put_together(motions)
+        everybody = find(path).people and arguments.animation is None and arguments.unit is None
+        people = io.load_scene(path) if everybody else [read_clip(arguments, path)[0]]
+        motions = at_rate((crop(motion, arguments) for motion in people), arguments.fps)
+        alone = len(motions) == 1
+        motions = [target.put(motions[0], source=str(path))] if alone else target.put_together(motions)
         takes.append(Take(path.stem, motions))
-    write_page(takes, target, character=character)
-    size = target.stat().st_size
+    write_page(takes, out, character=character)
+    size = out.stat().st_size
     if size > MAX_BYTES:
-        print(
-            f"note: {target} is {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}, with {arguments.skeleton}, "
-            "its pictures and its motion in it; smaller pictures or a shorter motion make it smaller",
-            file=sys.stderr,
+        note(
+            f"{out} is {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}, with {arguments.skeleton}, "
+            "its pictures and its motion in it; smaller pictures or a shorter motion make it smaller"
         )
 
 
-def _people(arguments: argparse.Namespace, path: Path) -> list[Motion]:
-    """Everybody in a file, or the one motion that the line picks of it."""
-
-    if find(path).people and arguments.animation is None and arguments.unit is None:
-        return io.load_scene(path)
-    return [read_clip(arguments, path)[0]]
-
-
-def run_info(arguments: argparse.Namespace) -> None:
+def run_info(arguments: Namespace) -> None:
     """``motionloom info FILE``."""
 
     motion, unit, _ = read_clip(arguments, arguments.input)
-    clips = _clips(arguments.input)
+    clips = open_glb(arguments.input).lengths if arguments.input.suffix.lower() in GLTF else []
     motion = crop(motion, arguments)
     info, did = describe(motion), measure_deeds(motion)
     problems = [*info.problems, *([RATE_ASSUMED] if rate_assumed(arguments, [arguments.input]) else [])]
@@ -176,28 +157,16 @@ def run_info(arguments: argparse.Namespace) -> None:
         print(f"  problem   {problem}")
 
 
-def _clips(path: Path) -> list[tuple[str, float]]:
-    """Name and seconds of each animation of a glTF file."""
-
-    return open_glb(path).lengths if path.suffix.lower() in GLTF else []
-
-
 def _summary(motion: Motion) -> str:
     frames = "1 frame" if len(motion) == 1 else f"{len(motion)} frames"
     return f"{frames}, {motion.seconds:.2f} s at {motion.fps:g} frames per second, {len(motion.skeleton)} joints"
 
 
-def _files(arguments: argparse.Namespace) -> tuple[list[Path], Path]:
+def _files(arguments: Namespace) -> tuple[list[Path], Path]:
     """What is read, and where to write, whether that is named as OUT or with ``--out``."""
 
     if arguments.out is not None:
         return arguments.inputs, arguments.out
     if len(arguments.inputs) < 2:
-        raise MotionloomError("one file to write is needed, such as: motionloom export IN OUT; got none")
+        fail("one file to write is needed, such as: motionloom export IN OUT; got none")
     return arguments.inputs[:-1], arguments.inputs[-1]
-
-
-def _only_bvh(arguments: argparse.Namespace, target: Path) -> None:
-
-    if arguments.out_unit or arguments.order:
-        raise MotionloomError(f"--out-unit and --order are for BVH files; {target} is none")

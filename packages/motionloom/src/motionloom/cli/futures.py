@@ -1,20 +1,18 @@
 """Where the files of predictions go, and how they are written: futures, pictures of them, and futures of hours."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
-from motionloom.cli.sampling import fail, numbered
-from motionloom.cli.skeletons import Target as Skin
-from motionloom.cli.skeletons import open_target, put_all
+from motionloom.cli.sampling import fail, numbered, write_pieces
+from motionloom.cli.skeletons import Target
 from motionloom.errors import MotionloomError
 from motionloom.formats import writable
-from motionloom.interruption import held_back
-from motionloom.io import check_output, check_program, save
-from motionloom.io.bvh_writer import save_bvh
+from motionloom.io import check_output, check_program
 from motionloom.io.folder import atomic_folder, check_folder
-from motionloom.io.stream import Stream, joined, open_stream
+from motionloom.io.stream import Stream, joined
 from motionloom.motion import Motion
 
 OVERLAYS = (".png", ".mp4", ".gif")
@@ -25,7 +23,7 @@ BEFORE, BEHIND = 2.0, 10.0
 
 
 @dataclass(frozen=True)
-class Target:
+class Files:
     """The files of one ``--out``."""
 
     folder: Path
@@ -40,36 +38,26 @@ class Target:
         return [self.folder / name for names in (*self.futures, self.overlays) for name in names]
 
 
-@dataclass(frozen=True)
-class Writing:
-    """How the past's own file says its numbers, if it is a BVH; and the skeleton that futures are put on instead."""
-
-    unit: float = 1.0
-    orders: dict[str, str] = field(default_factory=dict)
-    skeleton: Skin | None = None
-
-
 def targets(
     outs: Sequence[Path], count: int, formats: Sequence[str], *, pictures: bool, own: str | None = None
-) -> list[Target]:
+) -> list[Files]:
     """The files to write; refuses places that cannot be, before any work; ``own`` is a character's own suffix."""
 
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each its own name")
-    found = [_target(out, count, formats, pictures=pictures, own=own) for out in outs]
-    for place in (place for target in found if target.folder.is_dir() for place in target.files):
+    found = [_files(out, count, formats, pictures=pictures, own=own) for out in outs]
+    for place in (place for files in found if files.folder.is_dir() for place in files.files):
         check_output(place, own=own)
     return found
 
 
-def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Target:
-
+def _files(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Files:
     suffix = out.suffix.lower()
     if suffix in (*writable(), own) and not out.is_dir():
         check_output(out, own=own)
         if suffix in OVERLAYS:
-            return Target(out.parent, (), (out.name,))
-        return Target(out.parent, (tuple(place.name for place in numbered(out, count)),), ())
+            return Files(out.parent, (), (out.name,))
+        return Files(out.parent, (tuple(place.name for place in numbered(out, count)),), ())
     if suffix and not out.is_dir():
         fail(
             f"cannot write {out}: a file ends in {', '.join(writable())}, "
@@ -80,7 +68,7 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
     names = tuple(tuple(f"future_{i:0{width}d}.{one}" for i in range(count)) for one in dict.fromkeys(formats))
     for one in formats:
         check_program(f"future.{one}")
-    return Target(out, names, ("overview.png", _film()) if pictures else ())
+    return Files(out, names, ("overview.png", _film()) if pictures else ())
 
 
 def _film() -> str:
@@ -94,30 +82,25 @@ def _film() -> str:
 
 
 def write_futures(
-    wanted: Sequence[Target], motions: Sequence[Motion], past: int, writing: Writing, *, caption: str
+    wanted: Sequence[Files], motions: Sequence[Motion], past: int, target: Target, *, caption: str
 ) -> list[Path]:
     """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does.
 
     There may be fewer than names in ``wanted``: then the first of those are written. Gives the files that were.
     """
 
-    motions = put_all(writing.skeleton, motions)
+    motions = [target.put(motion) for motion in motions]
     with ExitStack() as stack:
-        for target in wanted:
-            folder = stack.enter_context(atomic_folder(target.folder))
-            for names in target.futures:
+        for files in wanted:
+            folder = stack.enter_context(atomic_folder(files.folder))
+            for names in files.futures:
                 for motion, name in zip(motions, names[: len(motions)], strict=True):
-                    if writing.skeleton is not None:
-                        writing.skeleton.save(motion, folder / name, caption=Path(name).stem)
-                    elif name.lower().endswith(".bvh"):
-                        save_bvh(motion, folder / name, order=writing.orders, unit=writing.unit)
-                    else:
-                        save(motion, folder / name, captions=[Path(name).stem])
-            draw_overlays(motions, past, [folder / name for name in target.overlays], caption=caption)
+                    target.save(motion, folder / name, caption=Path(name).stem)
+            draw_overlays(motions, past, [folder / name for name in files.overlays], caption=caption)
     return [
-        target.folder / name
-        for target in wanted
-        for names in (*(names[: len(motions)] for names in target.futures), target.overlays)
+        files.folder / name
+        for files in wanted
+        for names in (*(names[: len(motions)] for names in files.futures), files.overlays)
         for name in names
     ]
 
@@ -141,8 +124,8 @@ def draw_overlays(motions: Sequence[Motion], past: int, files: Sequence[Path], *
 class Long:
     """Futures that are written while they are made, and what became of them."""
 
-    wanted: Sequence[Target]
-    writing: Writing
+    wanted: Sequence[Files]
+    target: Target
     past: int
     """Frames that are given, at the beginning of each."""
     frames: int
@@ -159,7 +142,7 @@ class Long:
 
         problem: BaseException | None = None
         with ExitStack() as stack:
-            folders = [stack.enter_context(atomic_folder(target.folder)) for target in self.wanted]
+            folders = [stack.enter_context(atomic_folder(files.folder)) for files in self.wanted]
             try:
                 heads = [self._one(number, pieces, folders) for number, pieces in enumerate(makers)]
                 self._draw(heads[:SHOWN], folders)
@@ -177,52 +160,35 @@ class Long:
 
     def _one(self, number: int, pieces: Iterable[Motion], folders: Sequence[Path]) -> Motion | None:
         """Write one future to the end; gives what pictures show of it."""
-        streams: list[tuple[Path, Stream]] = []
+        coming = iter(pieces)
+        first = next(coming)
+        streams = self._open(number, first, folders)
         shown: list[Motion] = []
-        at = 0
+
+        def seen() -> Iterator[Motion]:
+            at = 0
+            for piece in chain([first], coming):
+                yield piece
+                shown.extend(self._shown(piece, at) if number < SHOWN else [])
+                at += len(piece)
+
         try:
-            with ExitStack() as stack:
-                for piece in pieces:
-                    if not streams:
-                        streams = self._open(number, piece, folders)
-                        for _, stream in streams:
-                            stack.enter_context(stream)
-                    with held_back():
-                        for _, stream in streams:
-                            stream.write(piece)
-                    shown += self._shown(piece, at) if number < SHOWN else []
-                    at += len(piece)
-        except KeyboardInterrupt:
-            with held_back():  # it may have come just before they were closed
-                for _, stream in streams:
-                    stream.close()
-            raise
+            write_pieces(seen(), [stream for _, stream in streams])
         finally:
             self.finished += [(place, stream.seconds) for place, stream in streams if stream.saved]
-        return _joined(shown)
+        return joined(shown) if shown else None
 
     def _open(self, number: int, piece: Motion, folders: Sequence[Path]) -> list[tuple[Path, Stream]]:
         """The files of one future, and where they will be; those that grow on the disk last: they close first."""
 
         found = []
-        for target, folder in zip(self.wanted, folders, strict=True):
-            for names in target.futures:
-                if self.writing.skeleton is not None:
-                    stream = open_target(
-                        self.writing.skeleton, folder / names[number], caption=Path(names[number]).stem
-                    )
-                    found.append((target.folder / names[number], stream))
-                    continue
-                stream = open_stream(
-                    folder / names[number],
-                    total=self.frames,
-                    fps=piece.fps,
-                    joints=len(piece.skeleton),
-                    caption=Path(names[number]).stem,
-                    order=self.writing.orders,
-                    unit=self.writing.unit,
+        for files, folder in zip(self.wanted, folders, strict=True):
+            for name in (names[number] for names in files.futures):
+                joints, caption = len(piece.skeleton), Path(name).stem
+                stream = self.target.open(
+                    folder / name, total=self.frames, fps=piece.fps, joints=joints, caption=caption
                 )
-                found.append((target.folder / names[number], stream))
+                found.append((files.folder / name, stream))
         return sorted(found, key=lambda pair: pair[0].suffix.lower() == ".bvh")
 
     def _shown(self, piece: Motion, at: int) -> list[Motion]:
@@ -233,14 +199,9 @@ class Long:
 
     def _draw(self, heads: Sequence[Motion | None], folders: Sequence[Path]) -> None:
         motions = [head for head in heads if head is not None]
-        for target, folder in zip(self.wanted, folders, strict=True):
+        for files, folder in zip(self.wanted, folders, strict=True):
             if not motions:
                 continue
             past = min(self.past, round(BEFORE * motions[0].fps))
-            draw_overlays(motions, past, [folder / name for name in target.overlays], caption=self.caption)
-            self.finished += [(target.folder / name, 0.0) for name in target.overlays]
-
-
-def _joined(pieces: Sequence[Motion]) -> Motion | None:
-
-    return joined(pieces) if pieces else None
+            draw_overlays(motions, past, [folder / name for name in files.overlays], caption=self.caption)
+            self.finished += [(files.folder / name, 0.0) for name in files.overlays]

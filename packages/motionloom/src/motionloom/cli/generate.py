@@ -1,7 +1,7 @@
 """`motionloom generate`: words to motion files."""
 
-import argparse
 import sys
+from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -9,31 +9,33 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.cli.finished import finished_motions
-from motionloom.cli.looping import check_loop
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
     bar,
+    check_loop,
     check_outs,
     check_prompt,
     fail,
+    finished_motions,
     load_prior,
     places,
     report,
     request_of,
+    segment_rows,
     unknown_words,
 )
 from motionloom.cli.skeletons import Target
+from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
 from motionloom.goals.remarks import numbers_read, parts_read
 from motionloom.goals.timeline import Timeline
 from motionloom.io.text import read_text
-from motionloom.kinematics.gestures import Seat
+from motionloom.kinematics.gestures import Seat, seats
 from motionloom.kinematics.physics import TOES
 from motionloom.kinematics.stairs import stairs
 from motionloom.motion import Motion
-from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import SOLVER
+from motionloom.requests.tasks import Generate
 from motionloom.requests.timeline import usual_seconds
 from motionloom.tasks.run import Models, Plan, run_each
 from motionloom.tasks.worded import Worded
@@ -43,37 +45,42 @@ MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
 
 
-def run_generate(arguments: argparse.Namespace) -> int:
+def run_generate(arguments: Namespace) -> int:
     """``motionloom generate PROMPT``."""
     prompts = _prompts(arguments)
     outs, target = check_outs(arguments)
     if len(prompts) * arguments.count > MAX_MOTIONS:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
-    files = places(outs, len(captions), target=target)
+    files = places(outs, len(captions), target)
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
-    metre = 1.0 if target is None else target.metre
-    timelines = {prompt: _timeline(arguments, prior, prompt, metre) for prompt in prompts}
+    timelines = {prompt: _timeline(arguments, prior, prompt, target.metre) for prompt in prompts}
     for found in timelines.values():
         check_loop(arguments, found.seconds)
     remarks = unknown_words(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
+    made = finished_motions(files, captions, target, arguments.fps)
     worded: list[Worded] = []
-    drawn = _generated(arguments, prior, [(prompt, timelines[prompt]) for prompt in prompts], worded, unknown=remarks)
     seated: list[list[Seat]] = []
-    interrupted = made.take(([motion] for motion in _noting(seated, drawn, target)), measured=arguments.json)
+    asked = [(prompt, timelines[prompt]) for prompt in prompts]
+
+    def sampled() -> Iterator[list[Motion]]:
+        for motion in _generated(arguments, prior, asked, worded, unknown=remarks):
+            seated.append([_moved(seat, target, motion) for seat in seats(motion.positions(), motion.fps)])
+            yield [motion]
+
+    interrupted = made.take(sampled(), measured=arguments.json)
     motions = [
         {
             "prompt": caption,
             "seed": arguments.seed + i,
-            "segments": _segments(worded[i].timeline),
-            "seats": [asdict(seat) for seat in seats],
+            "segments": segment_rows(worded[i].timeline),
+            "seats": [asdict(seat) for seat in taken],
             "stairs": stairs_under(worded[i].motion),
             "amounts": [asdict(one) for one in worded[i].amounts],
             "still_from": worded[i].still_from,
         }
-        for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
+        for i, (caption, taken) in enumerate(zip(captions[: made.count], seated))
     ]
     _remark_seats(seated[: made.count])
     for motion, did in zip(motions, made.happened):
@@ -81,10 +88,9 @@ def run_generate(arguments: argparse.Namespace) -> int:
     for number, motion in enumerate(motions, start=1):
         if under := motion["stairs"]:
             whose = f"motion {number} " if len(motions) > 1 else ""
-            print(
-                f"motionloom: {whose}goes over {under['steps']} steps of {under['rise']:.2f} m, which are not shown; "
-                "--json has their places",
-                file=sys.stderr,
+            say(
+                f"{whose}goes over {under['steps']} steps of {under['rise']:.2f} m, which are not shown; "
+                "--json has their places"
             )
     length = usual_seconds(prompts[0]) if arguments.seconds is None else arguments.seconds
     about = {
@@ -95,16 +101,6 @@ def run_generate(arguments: argparse.Namespace) -> int:
     }
     report(arguments, about, made.written, made.sampling)
     return made.ended(interrupted)
-
-
-def _noting(seated: list[list[Seat]], motions: Iterator[Motion], target: Target | None) -> Iterator[Motion]:
-    """The motions as they come; the seats of each, as a character of that size needs them, are put into ``seated``."""
-    from motionloom.kinematics.gestures import seats
-
-    for motion in motions:
-        found = seats(motion.positions(), motion.fps)
-        seated.append(found if target is None else [_moved(seat, target, motion) for seat in found])
-        yield motion
 
 
 def stairs_under(motion: Motion) -> dict[str, Any] | None:
@@ -123,24 +119,23 @@ def stairs_under(motion: Motion) -> dict[str, Any] | None:
 
 
 def _moved(seat: Seat, target: Target, motion: Motion) -> Seat:
-
+    """A seat as a character of the target's size needs it."""
     x, height, z = target.from_motion(motion).to_world(np.array([seat.x, seat.height, seat.z]) * target.size)
     return replace(seat, height=float(height), x=float(x), z=float(z))
 
 
 def _remark_seats(seated: list[list[Seat]]) -> None:
     """Say on stderr where a seat belongs: nothing is drawn but the person."""
-    for number, seats in enumerate(seated, start=1):
+    for number, found in enumerate(seated, start=1):
         whose = f"motion {number} " if len(seated) > 1 else ""
-        for one in seats[:3]:
-            print(
-                f"motionloom: {whose}sits from {one.begin:.1f} to {one.end:.1f} s: a seat {one.height:.2f} m high "
-                f"belongs at x {one.x:.2f}, z {one.z:.2f} m",
-                file=sys.stderr,
+        for one in found[:3]:
+            say(
+                f"{whose}sits from {one.begin:.1f} to {one.end:.1f} s: a seat {one.height:.2f} m high "
+                f"belongs at x {one.x:.2f}, z {one.z:.2f} m"
             )
 
 
-def _timeline(arguments: argparse.Namespace, prior: Prior, prompt: str, metre: float) -> Timeline:
+def _timeline(arguments: Namespace, prior: Prior, prompt: str, metre: float) -> Timeline:
     """What a prompt asks, one segment or several; says so where there are several. metre: as of `Target.metre`."""
     from motionloom.tasks.worded import read
 
@@ -153,27 +148,19 @@ def _timeline(arguments: argparse.Namespace, prior: Prior, prompt: str, metre: f
         metre=metre,
     )
     if said := numbers_read(found):
-        print(f"motionloom: {said}; --literal leaves numbers to the network", file=sys.stderr)
+        say(f"{said}; --literal leaves numbers to the network")
     if said := parts_read(found):
         if arguments.solver != SOLVER:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
-        print(f"motionloom: {said}; --as-one leaves the sentence whole", file=sys.stderr)
+        say(f"{said}; --as-one leaves the sentence whole")
     return found
-
-
-def _segments(timeline: Timeline) -> list[dict[str, object]]:
-    begins = [frame / 20 for frame in timeline.begins]
-    return [
-        {"begin": begin, "end": end, "text": segment.text}
-        for begin, end, segment in zip(begins, begins[1:], timeline.segments, strict=False)
-    ]
 
 
 LONGEST = 30.0
 """Seconds of one sentence above which a long motion is meant."""
 
 
-def _prompts(arguments: argparse.Namespace) -> list[str]:
+def _prompts(arguments: Namespace) -> list[str]:
     prompts = [*one_sentence(arguments.prompts), *(_lines(arguments.file) if arguments.file else ())]
     if not prompts:
         fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
@@ -182,10 +169,9 @@ def _prompts(arguments: argparse.Namespace) -> list[str]:
     for prompt in prompts:
         check_prompt(prompt)
     if arguments.seconds is not None and arguments.seconds > LONGEST:
-        print(
-            f"note: {arguments.seconds:g} s are long for one sentence; several that follow each other are made with: "
-            "motionloom compose 'a person walks' 'a person sits down'",
-            file=sys.stderr,
+        note(
+            f"{arguments.seconds:g} s are long for one sentence; several that follow each other are made with: "
+            "motionloom compose 'a person walks' 'a person sits down'"
         )
     return prompts
 
@@ -201,7 +187,7 @@ def _lines(file: Path) -> list[str]:
 
 
 def _generated(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     prior: Prior,
     asked: list[tuple[str, Timeline]],
     worded: list[Worded],
@@ -222,5 +208,5 @@ def _generated(
             worded.append(one)
             for line in one.shortfalls:
                 whose = f"motion {len(worded)}: " if several else ""
-                print(f"motionloom: {whose}{line}", file=sys.stderr)
+                say(f"{whose}{line}")
             yield from result.people

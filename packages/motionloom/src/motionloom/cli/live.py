@@ -1,8 +1,7 @@
 """`motionloom live`: a scripted session with one or two people who are steered, to files or against the clock."""
 
-import argparse
 import json
-import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import groupby
@@ -10,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.cli.duet import check_pair_outs, write_pairs
-from motionloom.cli.looping import check_loop, looped
 from motionloom.cli.reading import load_motion
 from motionloom.cli.robots import note_on_metres
-from motionloom.cli.sampling import check_outs, fail, load_prior
-from motionloom.cli.sampling import write as write_files
+from motionloom.cli.sampling import check_loop, check_outs, fail, load_prior, looped
 from motionloom.cli.skeletons import Target
+from motionloom.cli.terminal import note
 from motionloom.cli.writing import check_overwriting, check_unit
 from motionloom.kinematics.deeds import happened
 from motionloom.live.clock import Health, Player
@@ -30,7 +28,7 @@ from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 
-def run_live(arguments: argparse.Namespace) -> int:
+def run_live(arguments: Namespace) -> int:
     """``motionloom live SCRIPT``."""
 
     script = read_script(arguments.script)
@@ -39,7 +37,7 @@ def run_live(arguments: argparse.Namespace) -> int:
         _report(arguments, script, [], None, {})
         return 0
     outs, target = check_outs(arguments) if script.people == 1 else check_pair_outs(arguments)
-    if target is not None and script.people == 1:
+    if script.people == 1:
         target.names(["live"])
     check_unit(arguments, outs)
     check_overwriting(arguments, outs)
@@ -48,22 +46,22 @@ def run_live(arguments: argparse.Namespace) -> int:
     set_threads(1)  # a window's matrices are small: two threads would wait for each other at every layer
     prior = load_prior(arguments)
     seed = script.seed if arguments.seed is None else arguments.seed
-    metre = 1.0 if target is None else target.metre
+    metre = target.metre
     if metre != 1.0 and any(scaled(one.command, 1 / metre) != one.command for one in script.commands):
-        print(f"note: {note_on_metres(metre)}", file=sys.stderr)
+        note(note_on_metres(metre))
     live = _stage(arguments, script, prior, seed, metre=metre)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
     words = [[one.words for one in shown] for shown in frames]
     motions = [motion_of([shown[i] for shown in frames], live.fps) for i in range(script.people)]
     motions = [looped(arguments, prior, one, said, seed=seed) for one, said in zip(motions, words[-1], strict=True)]
     write = _write if script.people == 1 else _write_pair
-    written = write(motions, words, outs, target, arguments.out_unit)
+    written = write(motions, words, outs, target)
     did = happened(motions) if arguments.json else []
     _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames), "happened": did})
     return 0
 
 
-def _stage(arguments: argparse.Namespace, script: Script, prior: Prior, seed: int, *, metre: float) -> Stage:
+def _stage(arguments: Namespace, script: Script, prior: Prior, seed: int, *, metre: float) -> Stage:
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
     starts = [load_motion(arguments, path) for path in arguments.start or ()]
@@ -91,11 +89,7 @@ def _against_time(script: Script, live: Stage) -> tuple[list[tuple[Frame, ...]],
 
 
 def _write(
-    motions: Sequence[Motion],
-    words: Sequence[Sequence[str]],
-    outs: Sequence[Path],
-    target: Target | None,
-    unit: float | None,
+    motions: Sequence[Motion], words: Sequence[Sequence[str]], outs: Sequence[Path], target: Target
 ) -> list[Path]:
     """The files of one person, with the words of each frame; a picture shows each stretch of the same in a row."""
     (whole,) = motions
@@ -107,27 +101,21 @@ def _write(
     said = "; ".join(one for one, _ in stretches[:20])
     files: list[Path] = []
     for out in outs:
-        pieces = stretches[:50] if out.suffix.lower() == ".png" and target is None else [(said, whole)]
-        shown = [motion if target is None else target.put(motion) for _, motion in pieces]
-        files += write_files(shown, [out], [one for one, _ in pieces], target, unit=unit)
+        pieces = stretches[:50] if out.suffix.lower() == ".png" and target.skeleton is None else [(said, whole)]
+        files += target.save_all([target.put(motion) for _, motion in pieces], [out], [one for one, _ in pieces])
     return files
 
 
 def _write_pair(
-    motions: Sequence[Motion],
-    words: Sequence[Sequence[str]],
-    outs: Sequence[Path],
-    target: Target | None,
-    unit: float | None,
+    motions: Sequence[Motion], words: Sequence[Sequence[str]], outs: Sequence[Path], target: Target
 ) -> list[Path]:
     """The files of two people; those that hold one person each come in twos."""
-    duet = list(motions) if target is None else target.put_together(motions)
     said = dict.fromkeys(" :: ".join(both) for both in words)
-    return write_pairs([duet], [[out] for out in outs], [(unit or 1.0, {})] * 2, "; ".join([*said][:20]), target)
+    return write_pairs([target.put_together(motions)], [[out] for out in outs], [target] * 2, "; ".join([*said][:20]))
 
 
 def _report(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     script: Script,
     written: Sequence[Path],
     health: Health | None,

@@ -2,9 +2,9 @@
 
 import argparse
 import difflib
-import sys
 from collections.abc import Iterable, Sequence
 
+from motionloom.cli.terminal import note
 from motionloom.errors import MotionloomError
 
 COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
@@ -53,7 +53,7 @@ def with_options(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[
         if plain or name in known:
             found.append(word)
         elif RENAMED.get(name) in known:
-            print(f"note: {name} is {RENAMED[name]} now; the old name goes with the next release", file=sys.stderr)
+            note(f"{name} is {RENAMED[name]} now; the old name goes with the next release")
             found.append(RENAMED[name] + equals + value)
         elif OPTIONS.get(name) in known:
             found.append(OPTIONS[name] + equals + value)

@@ -51,7 +51,8 @@ def add_options(
             parser.add_argument(option(name, spec), dest=name, action=kind, help=sentence)
             continue
         about = [f"{spec.low:g} to {spec.high:g}"] if spec.high <= 1000 and spec.kind in ("whole", "number") else []
-        about += [] if spec.default is None or spec.many else [f"default {_shown(spec.default)}"]
+        if spec.default is not None and not spec.many:
+            about.append(f"default {spec.default:g}" if isinstance(spec.default, float) else f"default {spec.default}")
         about += ["repeatable"] if spec.many else []
         parser.add_argument(
             option(name, spec),
@@ -85,10 +86,6 @@ def _metavar(spec: Spec) -> str | tuple[str, ...]:
     number = {"seconds": "S", RATE: "N"}.get(spec.unit, "X")
     one = {"whole": "N", "number": number}.get(spec.kind, "WORD")
     return {0: one, 2: ("FROM", "TO")}.get(spec.size, tuple("XYZ"))
-
-
-def _shown(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}

@@ -1,9 +1,8 @@
 """`motionloom predict` and `motionloom switch`: what may come after a motion, and the way from one to another."""
 
-import argparse
 import json
-import sys
-from collections.abc import Callable, Generator, Iterator, Sequence
+from argparse import Namespace
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -11,20 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.cli.finished import Finished
-from motionloom.cli.futures import Long, Writing, targets, write_futures
-from motionloom.cli.futures import Target as Files
-from motionloom.cli.looping import check_loop_behind
+from motionloom.cli.futures import Files, Long, targets, write_futures
 from motionloom.cli.reading import check_size, crop, load_motion, note_rate, read_clip
-from motionloom.cli.sampling import bar, fail, request_of, results, sampling_of
+from motionloom.cli.sampling import Finished, bar, check_loop_behind, fail, request_of, results, sampling_of
 from motionloom.cli.skeletons import Target, read_target
+from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.goals import mask_file
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.io import check_output
 from motionloom.io.stream import check_length, resampled
 from motionloom.motion import MAX_POSES, Motion
-from motionloom.requests.predict import Predict, Switch
+from motionloom.requests.tasks import Predict, Switch
 from motionloom.retarget import retarget
 from motionloom.tasks.predict import predict_pieces
 from motionloom.tasks.run import Models, Plan
@@ -38,41 +35,31 @@ SAME_BONE = 1e-4
 """Metres by which bones of one skeleton may differ from file to file: numbers are rounded when they are written."""
 
 
-def run_predict(arguments: argparse.Namespace) -> int:
+def run_predict(arguments: Namespace) -> int:
     """``motionloom predict PAST``."""
 
     check_rate(arguments)
     _check_asked(arguments)
     outs = arguments.out or [Path("futures")]
-    skin = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
-    if skin is not None:
-        skin.names(["future"])
-    own = skin and skin.suffix
+    target = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
+    target.names(["future"])
+    own = target.suffix
     formats = arguments.format or [own[1:] if own else "bvh"]
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
-    past, writing, horizon = _read_past(arguments, skin, wanted)
+    past, target, horizon = _read_past(arguments, target, wanted)
     hold = _hold(arguments, past, horizon)
     check_loop_behind(arguments, past.seconds, arguments.seconds, "nothing is held there" if hold else "")
-    predictor = _predictor(arguments)
+    predictor = Predictor.load(arguments.weights, device=arguments.device)
     if arguments.seconds > LONG:
         given, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
-        long = Long(wanted, writing, given, frames, _caption(arguments))
+        long = Long(wanted, target, given, frames, _caption(arguments))
         return _predict_long(arguments, predictor, past, hold=hold, long=long)
     values = request_of(arguments, Predict, {"motion": past, "root": not arguments.no_root})
     plan = Plan(task="predict", values=values, sampling=values.sampling, people=(past,), hold=hold)
-    note = lambda: _note_seen(predictor, past)  # noqa: E731
-    return _written(arguments, plan, predictor, wanted, writing, note=note)
+    return _written(arguments, plan, predictor, wanted, target)
 
 
-def _written(
-    arguments: argparse.Namespace,
-    plan: Plan,
-    predictor: Predictor,
-    wanted: list[Files],
-    writing: Writing,
-    *,
-    note: Callable[[], None] = lambda: None,
-) -> int:
+def _written(arguments: Namespace, plan: Plan, predictor: Predictor, wanted: list[Files], target: Target) -> int:
     """Make and write the futures, all of them at once, and say so; after an interruption those that were finished."""
 
     models, past = Models(arguments.loop_weights, predictor_weights=predictor, device=arguments.device), plan.people[0]
@@ -82,10 +69,10 @@ def _written(
     given = _frames_at(arguments, past, len(past))
 
     def write(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
-        written.extend(write_futures(wanted, motions, given, writing, caption=_caption(arguments)))
+        written.extend(write_futures(wanted, motions, given, target, caption=_caption(arguments)))
 
     made = Finished(
-        [[target.folder] for target in wanted[:1]],
+        [[files.folder] for files in wanted[:1]],
         arguments.count,
         write,
         put=lambda motions: at_rate(motions, arguments.fps),
@@ -94,38 +81,38 @@ def _written(
     drawn = results("predicting", plan, models)
     interrupted = made.take((list(one.people) for one in drawn), measured=arguments.json)
     _report(arguments, [str(file) for file in written], made.count, made.happened)
-    note()
+    if plan.task == "predict":
+        _note_seen(predictor, past)
     note_rate(arguments, _inputs(arguments))
     return made.ended(interrupted)
 
 
-def run_switch(arguments: argparse.Namespace) -> int:
+def run_switch(arguments: Namespace) -> int:
     """``motionloom switch PAST TARGET``."""
 
     check_rate(arguments)
     outs = arguments.out or [Path("switch.bvh")]
-    skin = read_target(arguments, outs)
-    if skin is not None:
-        skin.names(["switch"])
-    own = skin and skin.suffix
+    put_on = read_target(arguments, outs)
+    put_on.names(["switch"])
+    own = put_on.suffix
     for out in outs:
         check_output(out, own=own)  # files, and no folder
     wanted = targets(outs, arguments.count, [], pictures=False, own=own)
-    past, writing, horizon = _read_past(arguments, skin, wanted)
+    past, put_on, horizon = _read_past(arguments, put_on, wanted)
     target = _like_past(arguments, arguments.target, past)
     _check_poses(arguments, (len(past) + len(target) + horizon) * len(past.skeleton))
     check_loop_behind(arguments, past.seconds, arguments.seconds + target.seconds, f"{arguments.target} ends otherwise")
-    predictor = _predictor(arguments)
+    predictor = Predictor.load(arguments.weights, device=arguments.device)
     values = request_of(arguments, Switch, {"motion": past, "target": target})
     plan = Plan(task="switch", values=values, sampling=values.sampling, people=(past,), target=target)
-    return _written(arguments, plan, predictor, wanted, writing)
+    return _written(arguments, plan, predictor, wanted, put_on)
 
 
 # Futures of any length
 
 
 def _predict_long(
-    arguments: argparse.Namespace, predictor: Predictor, past: Motion, *, hold: FixedJoints | None, long: Long
+    arguments: Namespace, predictor: Predictor, past: Motion, *, hold: FixedJoints | None, long: Long
 ) -> int:
     """One future after the other, in memory that does not grow with their length."""
     if past.translations is not None:
@@ -140,10 +127,7 @@ def _predict_long(
     _report(arguments, lines, arguments.count)
     if interrupted:
         total = long.frames / (arguments.fps or past.fps)
-        print(
-            f"motionloom: interrupted; what was finished is in {long.finished_files()} of {total:.2f} s",
-            file=sys.stderr,
-        )
+        say(f"interrupted; what was finished is in {long.finished_files()} of {total:.2f} s")
         return 130
     _note_seen(predictor, past)
     note_rate(arguments, _inputs(arguments))
@@ -151,7 +135,7 @@ def _predict_long(
 
 
 def _pieces(
-    arguments: argparse.Namespace, predictor: Predictor, past: Motion, hold: FixedJoints | None, *, frames: int
+    arguments: Namespace, predictor: Predictor, past: Motion, hold: FixedJoints | None, *, frames: int
 ) -> Generator[Iterator[Motion], None, None]:
     """Of each future its pieces, while a bar shows how far they are."""
 
@@ -182,23 +166,18 @@ def _pieces(
 # What is read
 
 
-def _predictor(arguments: argparse.Namespace) -> Predictor:
-
-    return Predictor.load(arguments.weights, device=arguments.device)
-
-
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
+def _inputs(arguments: Namespace) -> list[Path]:
     other = getattr(arguments, "target", None) or getattr(arguments, "source", None)
     return [arguments.past] if other is None else [arguments.past, other]
 
 
-def _caption(arguments: argparse.Namespace) -> str:
+def _caption(arguments: Namespace) -> str:
     target = getattr(arguments, "target", None)
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(arguments: argparse.Namespace, skin: Target | None, wanted: list[Files]) -> tuple[Motion, Writing, int]:
-    """The past, how files say its numbers, and the frames that are made behind it."""
+def _read_past(arguments: Namespace, target: Target, wanted: list[Files]) -> tuple[Motion, Target, int]:
+    """The past, what futures of it become, and the frames that are generated behind it."""
     files = [file for one in wanted for file in one.files]
     check_unit(arguments, files)
     check_overwriting(arguments, files)
@@ -209,10 +188,10 @@ def _read_past(arguments: argparse.Namespace, skin: Target | None, wanted: list[
         fail(f"{arguments.past} has one frame here; a past has at least two, to say where one goes: take a longer one")
     horizon = round(arguments.seconds * past.fps)
     _check_size(arguments, past, horizon, wanted)
-    return past, Writing(arguments.out_unit or unit or 1.0, orders, skin), horizon
+    return past, target.like(unit, orders), horizon
 
 
-def _like_past(arguments: argparse.Namespace, path: Path, past: Motion) -> Motion:
+def _like_past(arguments: Namespace, path: Path, past: Motion) -> Motion:
     """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
 
     alike = path.suffix.lower() == arguments.past.suffix.lower()
@@ -245,7 +224,7 @@ def _difference(motion: Motion, past: Motion) -> str:
     return "bones that change length" if motion.translations is not None and past.translations is None else ""
 
 
-def _hold(arguments: argparse.Namespace, past: Motion, horizon: int) -> FixedJoints | None:
+def _hold(arguments: Namespace, past: Motion, horizon: int) -> FixedJoints | None:
     """What is held, if anything is."""
 
     if not (arguments.hold or arguments.mask):
@@ -279,7 +258,7 @@ def _hold(arguments: argparse.Namespace, past: Motion, horizon: int) -> FixedJoi
 # What cannot be asked
 
 
-def _check_asked(arguments: argparse.Namespace) -> None:
+def _check_asked(arguments: Namespace) -> None:
     if arguments.loop and arguments.seconds > LONG:
         fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
     if arguments.loop and arguments.no_root:
@@ -288,24 +267,24 @@ def _check_asked(arguments: argparse.Namespace) -> None:
         fail("--format csv is for a robot's joint angles; name its model with --robot")
 
 
-def _check_size(arguments: argparse.Namespace, past: Motion, horizon: int, wanted: list[Files]) -> None:
+def _check_size(arguments: Namespace, past: Motion, horizon: int, wanted: list[Files]) -> None:
     """Refuse what no file or memory holds, and less than a frame."""
 
     if horizon < 1:
         fail(f"{arguments.seconds:g} s are less than a frame of {arguments.past} ({1 / past.fps:.3g} s); give more")
     joints, frames = len(past.skeleton), _frames_at(arguments, past, len(past) + horizon)
-    for file in (target.folder / names[0] for target in wanted for names in target.futures):
+    for file in (files.folder / names[0] for files in wanted for names in files.futures):
         check_length(file, total=frames, fps=arguments.fps or past.fps, joints=joints)
     if arguments.seconds <= LONG:
         _check_poses(arguments, frames * joints)
 
 
-def _frames_at(arguments: argparse.Namespace, past: Motion, count: int) -> int:
+def _frames_at(arguments: Namespace, past: Motion, count: int) -> int:
     """How many frames so many of the past's rate become at ``--fps``, as `Motion.resample` makes them."""
     return count if arguments.fps is None else int((count - 1) / past.fps * arguments.fps + 1e-6) + 1
 
 
-def _check_poses(arguments: argparse.Namespace, each: int) -> None:
+def _check_poses(arguments: Namespace, each: int) -> None:
 
     if each * arguments.count > MAX_POSES:
         fail(
@@ -320,10 +299,10 @@ def _check_poses(arguments: argparse.Namespace, each: int) -> None:
 def _note_seen(predictor: Predictor, past: Motion) -> None:
     seen, there = predictor.observed / predictor.fps, past.seconds
     if there > seen + 1 / past.fps:
-        print(f"note: of the {there:.2f} s of the past the predictor sees the last {seen:.2f}", file=sys.stderr)
+        note(f"of the {there:.2f} s of the past the predictor sees the last {seen:.2f}")
 
 
-def _report(arguments: argparse.Namespace, written: list[str], count: int, happened: Sequence[Any] = ()) -> None:
+def _report(arguments: Namespace, written: list[str], count: int, happened: Sequence[Any] = ()) -> None:
     if arguments.json:
         about = {
             "past": str(arguments.past),

@@ -1,10 +1,11 @@
 """What the commands that read motion files share: options, reading, cutting, notes."""
 
-import argparse
-import sys
+from argparse import Namespace
 from pathlib import Path
 
 from motionloom import io
+from motionloom.cli.terminal import note
+from motionloom.cli.writing import fail
 from motionloom.errors import MotionloomError
 from motionloom.formats import with_clips
 from motionloom.io.bvh import read_bvh
@@ -15,14 +16,14 @@ from motionloom.retarget.upright import stood_up, up_axis
 RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
 
 
-def read_clip(arguments: argparse.Namespace, path: Path) -> tuple[Motion, float | None, dict[str, str]]:
+def read_clip(arguments: Namespace, path: Path) -> tuple[Motion, float | None, dict[str, str]]:
     """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
     from motionloom.cli.robots import read_motion, reads_as_clip
 
     if reads_as_clip(arguments, path):
         return read_motion(arguments, path), None, {}
     if arguments.animation is not None and path.suffix.lower() not in with_clips():
-        raise MotionloomError(
+        fail(
             f"--clip picks one of several animations of a {', '.join(with_clips())}, and {path} is none; leave it out "
             "(--clip-name names the one that is written)"
         )
@@ -36,14 +37,14 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> tuple[Motion, float 
     return _upright(motion, path, arguments), unit, orders
 
 
-def load_motion(arguments: argparse.Namespace, path: Path) -> Motion:
+def load_motion(arguments: Namespace, path: Path) -> Motion:
     """A motion whose file needs no options; a robot's joint angles with the robot of the line."""
     from motionloom.cli.robots import read_motion, reads_as_clip
 
     return read_motion(arguments, path) if reads_as_clip(arguments, path) else io.load(path)
 
 
-def _upright(motion: Motion, path: Path, arguments: argparse.Namespace) -> Motion:
+def _upright(motion: Motion, path: Path, arguments: Namespace) -> Motion:
     """The motion with +Y up, as the line says or as people stand; a remark where the file was turned."""
 
     wanted = arguments.up
@@ -54,13 +55,13 @@ def _upright(motion: Motion, path: Path, arguments: argparse.Namespace) -> Motio
     except MotionloomError:
         return stood_up(motion) if wanted == "z" else motion  # no person: nothing is known
     if wanted == "z" and found == "y":
-        raise MotionloomError(f"--up z, but the person in {path} stands along Y, which is up then; leave out --up")
+        fail(f"--up z, but the person in {path} stands along Y, which is up then; leave out --up")
     if wanted is None and found == "z?":
-        raise MotionloomError(
+        fail(
             f"the person in {path} lies along Z all the time; say --up z if Z is up in the file, --up y if they do lie"
         )
     if wanted is None and found == "z":
-        print(f"note: Z is up in {path}, as the person stands; it was turned (--up y leaves it)", file=sys.stderr)
+        note(f"Z is up in {path}, as the person stands; it was turned (--up y leaves it)")
     return stood_up(motion) if wanted == "z" or (wanted is None and found == "z") else motion
 
 
@@ -68,7 +69,7 @@ HUMAN_LEGS = (0.5, 1.3)
 """Metres of thigh and shin."""
 
 
-def check_size(arguments: argparse.Namespace, path: Path, motion: Motion) -> None:
+def check_size(arguments: Namespace, path: Path, motion: Motion) -> None:
     """Ask for the unit where bones are of no human length; a file of our own (.npz) or in a stated unit is believed."""
 
     if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):
@@ -79,25 +80,25 @@ def check_size(arguments: argparse.Namespace, path: Path, motion: Motion) -> Non
         return  # no person: no length is known
     low, high = HUMAN_LEGS if path.suffix.lower() == ".bvh" else (0.2, 3.0)  # characters are dwarfs and giants
     if not low <= leg <= high:
-        raise MotionloomError(
+        fail(
             f"the legs of the person in {path} would be {leg:.3g} m long; say which unit the file is in with --unit "
             "(m, dm, cm, mm, inch, or metres; --unit m takes it as it is)"
         )
 
 
-def crop(motion: Motion, arguments: argparse.Namespace) -> Motion:
+def crop(motion: Motion, arguments: Namespace) -> Motion:
     """The part between ``--start`` and ``--end``."""
     if arguments.start is None and arguments.end is None:
         return motion
     return motion.crop(arguments.start or 0.0, motion.seconds if arguments.end is None else arguments.end)
 
 
-def rate_assumed(arguments: argparse.Namespace, paths: list[Path]) -> bool:
+def rate_assumed(arguments: Namespace, paths: list[Path]) -> bool:
     """Whether a file's rate was neither in it nor given."""
     return arguments.source_fps is None and any(path.suffix.lower() == ".amc" for path in paths)
 
 
-def note_rate(arguments: argparse.Namespace, paths: list[Path]) -> None:
+def note_rate(arguments: Namespace, paths: list[Path]) -> None:
     """Say so on stderr."""
     if rate_assumed(arguments, paths):
-        print(f"note: {RATE_ASSUMED}", file=sys.stderr)
+        note(RATE_ASSUMED)

@@ -1,15 +1,16 @@
 """Robots on the command line: ``--robot`` of the commands that read and write motions, and ``robot-check``."""
 
-import argparse
 import json
-import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-from motionloom.cli.skeletons import Target
+from motionloom.cli.skeletons import OF_SKELETON, Target, refuse
+from motionloom.cli.terminal import note
+from motionloom.cli.writing import fail
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
@@ -121,12 +122,9 @@ class RobotTarget(Target):
             raise MotionloomError(f"{path} for {self.robot.name}: {error}") from None
         figures = measure(clip, self.robot, max_speed=self.max_speed)
         if clip.slowed:
-            print(
-                f"note: {path} is {clip.slowed:.2f} s longer than the motion, so that no joint is too fast",
-                file=sys.stderr,
-            )
+            note(f"{path} is {clip.slowed:.2f} s longer than the motion, so that no joint is too fast")
         for fault in figures.faults():
-            print(f"note: {path}: {fault}", file=sys.stderr)
+            note(f"{path}: {fault}")
         if self.figures:
             print(json.dumps({"file": str(path), **figures.as_dict()}))
         return clip
@@ -138,17 +136,15 @@ def note_on_metres(metre: float) -> str:
     return f"{said}; for the person that is generated, distances and speeds are {1 / metre:.2f} times as large"
 
 
-def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
+def read_robot_target(arguments: Namespace) -> RobotTarget:
     """What ``--robot`` and its options say."""
     from motionloom.robots.clip import FPS, check_settings
 
-    for name in ("skeleton", "root", "hands", "at", "clip_name", "replace", "one_file", "target_map"):
-        if getattr(arguments, name, None):
-            raise MotionloomError(f"--{name.replace('_', '-')} is for characters; leave it out with --robot")
+    refuse(arguments, ("skeleton", *OF_SKELETON), "is for characters; leave it out with --robot")
     fps = arguments.fps or FPS
     check_settings(fps, arguments.max_speed)
     robot = opened(arguments)
-    print(f"note: {robot.remarks()[-1]}", file=sys.stderr)
+    note(robot.remarks()[-1])
     return RobotTarget(
         name=str(arguments.robot),
         skeleton=robot.skeleton,
@@ -162,17 +158,17 @@ def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
     )
 
 
-def opened(arguments: argparse.Namespace) -> "Robot":
+def opened(arguments: Namespace) -> "Robot":
     """The robot of the line, what its file lacks told."""
     from motionloom.robots.body import read_robot
 
     robot = read_robot(arguments.robot, arguments.robot_map)
-    for note in robot.notes:
-        print(f"note: {note}", file=sys.stderr)
+    for remark in robot.notes:
+        note(remark)
     return robot
 
 
-def reads_as_clip(arguments: argparse.Namespace, path: Path) -> bool:
+def reads_as_clip(arguments: Namespace, path: Path) -> bool:
     """Whether a file holds joint angles of a robot; refuses one where the line names no robot."""
 
     if path.suffix.lower() not in OUTS:
@@ -182,11 +178,11 @@ def reads_as_clip(arguments: argparse.Namespace, path: Path) -> bool:
     if not is_clip(path):
         return False
     if getattr(arguments, "robot", None) is None:
-        raise MotionloomError(f"{path} holds joint angles of a robot; name its model with --robot")
+        fail(f"{path} holds joint angles of a robot; name its model with --robot")
     return True
 
 
-def read_motion(arguments: argparse.Namespace, path: Path, robot: "Robot | None" = None) -> Motion:
+def read_motion(arguments: Namespace, path: Path, robot: "Robot | None" = None) -> Motion:
     """A robot's file as motion of its skeleton; robot: that of the line, where it was read."""
     from motionloom.robots.body import to_motion
     from motionloom.robots.files import load_clip
@@ -195,15 +191,13 @@ def read_motion(arguments: argparse.Namespace, path: Path, robot: "Robot | None"
     rate = getattr(arguments, "source_fps", None)
     clip = load_clip(path, robot, fps=rate)
     if path.suffix.lower() == ".csv" and rate is None:
-        print(
-            f"note: {path} states no rate; {clip.fps:g} frames per second are assumed (--source-fps)", file=sys.stderr
-        )
+        note(f"{path} states no rate; {clip.fps:g} frames per second are assumed (--source-fps)")
     motion = to_motion(robot, clip.qpos, clip.fps)
     _READ[motion] = clip
     return motion
 
 
-def run_check(arguments: argparse.Namespace) -> int:
+def run_check(arguments: Namespace) -> int:
     """``motionloom robot-check FILE --robot MODEL``; 0 where every figure is within its limit, else 1."""
     from motionloom.cli.reading import crop, read_clip
     from motionloom.robots.clip import FPS, check_settings, put_on_robot
@@ -211,7 +205,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     from motionloom.robots.physics import track
 
     if arguments.robot is None:
-        raise MotionloomError("robot-check needs the robot's model; name it with --robot")
+        fail("robot-check needs the robot's model; name it with --robot")
     robot = opened(arguments)
     fps = arguments.fps or FPS
     check_settings(fps, arguments.max_speed)
@@ -233,7 +227,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     found = figures.as_dict() | {"faults": figures.faults()}
     if arguments.physics:
         if len(clip) < 2:
-            raise MotionloomError(f"{arguments.input} has one frame; --physics follows a clip of at least two")
+            fail(f"{arguments.input} has one frame; --physics follows a clip of at least two")
         found["physics"] = track(clip, robot).as_dict()
     if arguments.json:
         print(json.dumps({"file": str(arguments.input), **found}, indent=2))
@@ -242,11 +236,11 @@ def run_check(arguments: argparse.Namespace) -> int:
     return 1 if found["faults"] else 0
 
 
-def check_inputs(arguments: argparse.Namespace) -> int:
+def check_inputs(arguments: Namespace) -> int:
     """``motionloom export FILE --robot MODEL --check``: as `run_check`, in JSON; nothing is written."""
 
     if arguments.robot is None or len(arguments.inputs) != 1 or arguments.out is not None or arguments.mirror:
-        raise MotionloomError("--check says how good a robot's clip is; give one file, its --robot, and no OUT")
+        fail("--check says how good a robot's clip is; give one file, its --robot, and no OUT")
     arguments.input, arguments.json, arguments.physics = arguments.inputs[0], True, False
     return run_check(arguments)
 

@@ -1,7 +1,7 @@
 """`motionloom serve` and `motionloom studio`: motion over HTTP, and the page that draws it."""
 
-import argparse
 import os
+from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from motionloom.cli.writing import fail
@@ -10,12 +10,11 @@ if TYPE_CHECKING:
     from motionloom.goals.adapters import Applied
 
 
-def run_serve(arguments: argparse.Namespace) -> None:
+def run_serve(arguments: Namespace) -> None:
     """``motionloom serve``."""
     if not 0 <= arguments.port <= 65535:
         fail(f"--port must be 0 to 65535; got {arguments.port}")
-    _check_threads(arguments)
-    adapters = _adapters(arguments)
+    adapters = _checked(arguments)
     try:
         from motionloom.server.serving import Options, serve
     except ModuleNotFoundError as error:
@@ -40,20 +39,21 @@ def run_serve(arguments: argparse.Namespace) -> None:
     )
 
 
-def run_mcp(arguments: argparse.Namespace) -> None:
+def run_mcp(arguments: Namespace) -> None:
     """``motionloom mcp``."""
-    _check_threads(arguments)
-    adapters = _adapters(arguments)
+    adapters = _checked(arguments)
     from motionloom.server.assistant import run
 
     _set_threads(arguments)
     run(arguments.project, weights=arguments.weights, device=arguments.device, adapters=adapters)
 
 
-def _adapters(arguments: argparse.Namespace) -> "tuple[Applied, ...]":
-    """Those of the command line; a file that does not exist is reported before anything is started."""
+def _checked(arguments: Namespace) -> "tuple[Applied, ...]":
+    """The adapters of the command line, once what it says is checked, before anything is started."""
     from motionloom.goals.adapters import parse_adapter
 
+    if arguments.threads is not None and not 1 <= arguments.threads <= 1024:
+        fail(f"--threads must be 1 to 1024; got {arguments.threads}")
     adapters = tuple(parse_adapter(word) for word in arguments.adapter)
     for path, _ in adapters:
         if not path.is_file():
@@ -61,12 +61,7 @@ def _adapters(arguments: argparse.Namespace) -> "tuple[Applied, ...]":
     return adapters
 
 
-def _check_threads(arguments: argparse.Namespace) -> None:
-    if arguments.threads is not None and not 1 <= arguments.threads <= 1024:
-        fail(f"--threads must be 1 to 1024; got {arguments.threads}")
-
-
-def _set_threads(arguments: argparse.Namespace) -> None:
+def _set_threads(arguments: Namespace) -> None:
     if arguments.threads is not None:
         from motionloom.runtime import set_threads
 

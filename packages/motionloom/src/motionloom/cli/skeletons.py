@@ -1,15 +1,16 @@
 """What the commands that write motions share about skeletons: ``--skeleton`` and how a motion is put on it."""
 
-import argparse
-import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from argparse import Namespace
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import degrees
 from pathlib import Path
 
 from motionloom import io
+from motionloom.cli.terminal import note
+from motionloom.cli.writing import fail
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters, find, readable
 from motionloom.ground import GroundPose
@@ -19,7 +20,7 @@ from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.character import Character
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_read import open_glb
-from motionloom.io.stream import Kept, Stream
+from motionloom.io.stream import PERSON, Kept, Stream, check_length, open_stream
 from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import RootMode, retarget
 from motionloom.retarget.anatomy import Body, read_body
@@ -33,11 +34,12 @@ from motionloom.skeleton import SMPL22, Skeleton
 
 @dataclass(frozen=True)
 class Target:
-    """A skeleton that motions are put on, and how its own file says things."""
+    """A skeleton that motions are put on, and how its own file says things; or none: they keep their own."""
 
-    name: str
-    skeleton: Skeleton
-    unit: float = 1.0
+    name: str = ""
+    skeleton: Skeleton | None = None
+    unit: float | None = None
+    """Metres per unit of a BVH; None: those of the file that was read, else 1."""
     orders: dict[str, str] = field(default_factory=dict)
     character: Character | None = None
     at: str | None = None
@@ -51,9 +53,14 @@ class Target:
     one_file: bool = False
     """Whether several motions become animations of one file."""
 
+    def like(self, unit: float | None, orders: dict[str, str]) -> "Target":
+        """The target of a motion whose own BVH has this unit and these orders, which it keeps with its skeleton."""
+        return self if self.skeleton else replace(self, unit=self.unit or unit, orders=orders)
+
     def put(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
         """The motion on this skeleton, where the character stands; ``source`` names it in an error."""
-
+        if self.skeleton is None:
+            return motion
         place = self.place
         if place is None or (self.at is None and shares_world(motion, self.skeleton)):
             return self._put(motion, lambda made, body: made, source, source_map)
@@ -61,7 +68,8 @@ class Target:
 
     def put_together(self, motions: Sequence[Motion]) -> list[Motion]:
         """Motions of one world, each on this skeleton, the world's origin where the character stands."""
-
+        if self.skeleton is None:
+            return list(motions)
         world = self.place or HERE
         return [
             self._put(motion, lambda made, body: made if world == HERE else moved(made, body, world))
@@ -75,14 +83,20 @@ class Target:
         source: str = "the motion",
         source_map: Path | None = None,
     ) -> Motion:
-
+        assert self.skeleton is not None
         try:
             made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map)
         except MotionloomError as error:
             hint = "--source-map or --target-map"
             raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
-        body = read_body(self.skeleton, self.joint_map)
+        body = self.body
         return pose_hands(place_root(move(bend_toes(made, body), body), body, self.root), self.hands, self.joint_map)
+
+    @property
+    def body(self) -> Body:
+        """The parts of the skeleton."""
+        assert self.skeleton is not None
+        return read_body(self.skeleton, self.joint_map)
 
     @property
     def place(self) -> GroundPose | None:
@@ -109,8 +123,7 @@ class Target:
     @property
     def size(self) -> float:
         """How long its legs are, in those of the uniform person: a walk goes so much further on it."""
-
-        return read_body(self.skeleton, self.joint_map).leg / read_body(SMPL22).leg
+        return self.body.leg / read_body(SMPL22).leg if self.skeleton else 1.0
 
     @property
     def suffix(self) -> str | None:
@@ -126,16 +139,19 @@ class Target:
         """Whether a file of this name is the character's own with one more animation."""
         return path.suffix.lower() in self.suffixes
 
+    def holds_all(self, path: Path) -> bool:
+        """Whether one file of this name gets several motions as animations."""
+        return self.one_file and self.writes(path)
+
     def names(self, captions: Sequence[str]) -> list[str]:
         """What motions of these captions are called in the character's file; refuses names of another count."""
-
         if len(self.clip_names) not in (0, 1, len(captions)):
             needed = (
                 "one motion needs one --clip-name"
                 if len(captions) == 1
                 else (f"{len(captions)} motions need one --clip-name or {len(captions)}")
             )
-            raise MotionloomError(f"{needed}; got {len(self.clip_names)}")
+            fail(f"{needed}; got {len(self.clip_names)}")
         several = self.clip_names * len(captions) if len(self.clip_names) == 1 else self.clip_names
         return list(several or captions)
 
@@ -144,7 +160,6 @@ class Target:
 
         ``caption`` labels a picture, and is the animation's name where the line gives none.
         """
-
         if self.character is not None and self.writes(path):
             name = self.clip_names[0] if len(self.clip_names) == 1 else caption
             return self._save_own(self.character, [(motion, name)], path)
@@ -154,10 +169,35 @@ class Target:
             surfaces = read_surfaces(self.character, remark=True)
             return save_usda([motion], path, surfaces=surfaces or None)
         if self.plays_in(path):
-            return self.save_page([(caption or "", [motion])], path)
+            return self._save_page([(caption or "", [motion])], path)
         if path.suffix.lower() == ".bvh":
-            return save_bvh(motion, path, order=self.orders, unit=self.unit)
+            return save_bvh(motion, path, order=self.orders, unit=self.unit or 1.0)
         return io.save(motion, path, captions=None if caption is None else [caption])
+
+    def save_all(self, motions: Sequence[Motion], files: Sequence[Path], captions: Sequence[str]) -> list[Path]:
+        """Write motions that are `put` on the skeleton into the files of one ``--out``, one each or one for all."""
+        if self.holds_all(files[0]):
+            return [self.save_clips(motions, files[0], self.names(captions))]
+        if len(files) == len(motions):
+            return [self.save(one, file, caption=said) for one, file, said in zip(motions, files, captions)]
+        if self.plays_in(files[0]):
+            return [self._save_page([(said, [one]) for said, one in zip(captions, motions, strict=True)], files[0])]
+        return [io.save(list(motions), files[0], captions=captions)]
+
+    def save_together(self, people: Sequence[Motion], path: Path, caption: str) -> Path:
+        """Write two people who were `put_together` into one file."""
+        if self.plays_in(path):
+            return self._save_page([(caption, people)], path)
+        return io.save_scene(people, path, names=["first", "second"], captions=[caption] * 2)
+
+    def open(self, path: Path, *, total: int, fps: float, joints: int = PERSON, caption: str = "") -> Stream:
+        """A file for ``total`` frames that come in pieces; they are put on the skeleton when all of them are there."""
+        if self.skeleton is None:
+            unit = self.unit or 1.0
+            return open_stream(path, total=total, fps=fps, caption=caption, joints=joints, order=self.orders, unit=unit)
+        check_length(path, total=total, fps=fps, joints=len(self.skeleton))
+        self.names([caption])
+        return Kept(path, lambda whole: self.save(self.put(whole), path, caption=caption))
 
     def shown(self, motion: Motion, path: Path) -> Motion:
         """A motion that is `put` on the skeleton, as a file that holds poses gets it."""
@@ -171,8 +211,8 @@ class Target:
         """Whether a file of this name is a page in which the character plays."""
         return self.character is not None and path.suffix.lower() == ".html"
 
-    def save_page(self, takes: Sequence[tuple[str, Sequence[Motion]]], path: Path) -> Path:
-        """Write takes, names and people that are `put` on the skeleton, as a page in which the character plays."""
+    def _save_page(self, takes: Sequence[tuple[str, Sequence[Motion]]], path: Path) -> Path:
+        """Takes, names and people, as a page in which the character plays."""
         from motionloom.viz.page import Take, write_page
 
         return write_page([Take(name, people) for name, people in takes], path, character=self.character)
@@ -190,7 +230,7 @@ class Target:
         from motionloom.io.blender import glb_to_fbx
 
         if ".glb" not in character.suffixes:
-            raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
+            fail(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
         with tempfile.TemporaryDirectory() as folder:
             made = character.save_clips(clips, Path(folder) / "moving.glb", replace=self.replace)
             try:
@@ -199,30 +239,37 @@ class Target:
                 raise MotionloomError(str(error).replace(str(made), str(character.path))) from None
 
 
-def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:
-    """What is written where the line does not say: ``name`` with the suffix, or as the character is."""
+def own_outs(arguments: Namespace, name: str) -> list[Path]:
+    """What is written where the line does not say: ``name`` as a BVH, or as the character is."""
     if arguments.robot is not None:
         return [Path(name + ".csv")]
     own = Path(arguments.skeleton or "").suffix.lower()
-    return [Path(name + (own if own in characters() else suffix))]
+    return [Path(name + (own if own in characters() else ".bvh"))]
 
 
-def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
-    """The skeleton that the line names, if it does; refuses options and files that do not go with it."""
+OF_SKELETON = ("root", "hands", "at", "clip_name", "replace", "one_file", "target_map")
+"""Options that say how motions are put on a skeleton."""
 
+
+def refuse(arguments: Namespace, names: Sequence[str], why: str) -> None:
+    """Refuse options that the line has although they do not go with the rest of it."""
+    for name in names:
+        if getattr(arguments, name, None):
+            fail(f"--{name.replace('_', '-')} {why}")
+
+
+def read_target(arguments: Namespace, outs: Sequence[Path]) -> Target:
+    """What the line says that motions are put on; refuses options and files that do not go with it."""
     if arguments.robot is not None:
         from motionloom.cli.robots import read_robot_target
 
         return read_robot_target(arguments)
-    for name in ("robot_map", "max_speed", "avoid_collisions", "no_header", "figures"):
-        if getattr(arguments, name):
-            raise MotionloomError(f"--{name.replace('_', '-')} goes with a --robot; name its model")
+    own = ("robot_map", "max_speed", "avoid_collisions", "no_header", "figures")
+    refuse(arguments, own, "goes with a --robot; name its model")
     if arguments.skeleton is None:
-        for name in ("root", "hands", "at", "clip_name", "replace", "one_file", "target_map"):
-            if getattr(arguments, name, None):
-                raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
+        refuse(arguments, OF_SKELETON, "goes with a --skeleton; name one")
         _note_mannequin(arguments, outs)
-        return None
+        return Target(unit=arguments.out_unit)
     found = _find(arguments)
     found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
     _check_humanoid(found)
@@ -230,19 +277,15 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
         path = Path(found.name)
         own = arguments.clip_name or arguments.replace or found.one_file
         if own and not any(found.writes(out) or not out.suffix for out in outs):
-            raise MotionloomError(
-                f"--clip-name, --replace and --one-file are for the character's own file, a {path.suffix}"
-            )
+            fail(f"--clip-name, --replace and --one-file are for the character's own file, a {path.suffix}")
         for out in outs:
             if out.suffix.lower() == ".glb" and not found.writes(out):
-                raise MotionloomError(f"{out} cannot contain the character; give a name that ends in {path.suffix}")
+                fail(f"{out} cannot contain the character; give a name that ends in {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
-                raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
+                fail(f"{out} is the character itself; give the moving one another name with --out")
         _note_place(found)
     elif arguments.clip_name or arguments.replace or arguments.at or found.one_file:
-        raise MotionloomError(
-            f"--clip-name, --replace, --one-file and --at are for .glb, .gltf and .vrm characters; got {found.name}"
-        )
+        fail(f"--clip-name, --replace, --one-file and --at are for .glb, .gltf and .vrm characters; got {found.name}")
     return found
 
 
@@ -250,14 +293,13 @@ def _note_place(target: Target) -> None:
     """Say where motions start, where the line does not and it is not the origin."""
     if target.at is None and target.place is not None:
         place = target.place
-        print(
-            f"note: {target.name} stands at x {place.x:.2f}, z {place.z:.2f} m and faces {degrees(place.facing):.0f} "
-            "degrees to the left of +Z; its motions start there (--at origin: at the origin, facing +Z)",
-            file=sys.stderr,
+        note(
+            f"{target.name} stands at x {place.x:.2f}, z {place.z:.2f} m and faces {degrees(place.facing):.0f} "
+            "degrees to the left of +Z; its motions start there (--at origin: at the origin, facing +Z)"
         )
 
 
-def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None:
+def _note_mannequin(arguments: Namespace, outs: Sequence[Path]) -> None:
     """Say that a character whose motion is read does not come out itself."""
     source = next((getattr(arguments, name) for name in ("inputs", "clip", "past") if hasattr(arguments, name)), None)
     source = source[0] if isinstance(source, list) else source
@@ -267,17 +309,13 @@ def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None
 
     found = open_glb(source).document.json
     if found.get("meshes") and found.get("asset", {}).get("generator") != "motionloom":
-        print(
-            f"note: {bodies[0]} gets a simple body; --skeleton {source} writes that character with one more animation",
-            file=sys.stderr,
-        )
+        note(f"{bodies[0]} gets a simple body; --skeleton {source} writes that character with one more animation")
 
 
 def _check_humanoid(target: Target) -> None:
-    """Refuse a skeleton that is no person, or has no fingers for ``--hands``, before anything is drawn."""
-
+    """Refuse a skeleton that is no person, or has no fingers for ``--hands``, before anything is sampled."""
     try:
-        body = read_body(target.skeleton, target.joint_map)
+        body = target.body
     except MotionloomError as error:
         raise MotionloomError(f"--skeleton {target.name}: {error} (--target-map)") from None
     if body.upright and body.up[1] < 0.9:
@@ -290,7 +328,7 @@ def _check_humanoid(target: Target) -> None:
         check_fingers(body)
 
 
-def _find(arguments: argparse.Namespace) -> Target:
+def _find(arguments: Namespace) -> Target:
 
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
@@ -314,19 +352,5 @@ def _find(arguments: argparse.Namespace) -> Target:
         character = io.open_character(path, joint_map=arguments.target_map)
         return Target(name, character.skeleton, character=character, **options)
     if suffix not in readable():
-        raise MotionloomError(
-            f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(readable())}); got {name!r}"
-        )
+        fail(f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(readable())}); got {name!r}")
     return Target(name, io.load(path).skeleton, **options)
-
-
-def open_target(target: Target, path: Path, *, caption: str = "") -> Stream:
-    """A file whose motion is put on the skeleton when all of it is there."""
-
-    target.names([caption])
-    return Kept(path, lambda whole: target.save(target.put(whole), path, caption=caption))
-
-
-def put_all(target: Target | None, motions: Iterable[Motion]) -> list[Motion]:
-    """Motions on the target's skeleton; as they are without one."""
-    return list(motions) if target is None else [target.put(motion) for motion in motions]

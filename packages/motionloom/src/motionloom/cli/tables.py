@@ -6,13 +6,14 @@ command that it is the same as otherwise. Each of its ``options`` is one of thes
 
 * ``react-to``, the name of a row, in the command's table ``own`` or in ``shared.toml``;
 * ``@reading``, a group of ``shared.toml``;
-* ``duet.Duet seconds loop``, fields of a request; all whose values can be typed where none is named.
+* ``tasks.Duet seconds loop``, fields of a request; all whose values can be typed where none is named.
 
 Keys of an ``own`` row replace those of the shared row, and of the row in ``own`` of the command above. For a field, an
 ``own`` row may have another ``help``, and ``aliases``.
 """
 
 import argparse
+from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -84,7 +85,7 @@ def _add_commands(commands: Any, rows: Table, module: str, above: Table) -> None
             take_text_anywhere(parser)
 
 
-def _run(module: str, function: str, arguments: argparse.Namespace) -> int | None:
+def _run(module: str, function: str, arguments: Namespace) -> int | None:
     return getattr(import_module(module), function)(arguments)
 
 

@@ -26,6 +26,16 @@ class _Escaped:
         return getattr(self.unescaped, name)
 
 
+def say(line: str) -> None:
+    """Print a line of the program's own on stderr."""
+    print(f"motionloom: {line}", file=sys.stderr)
+
+
+def note(line: str) -> None:
+    """Print on stderr what somebody may want to know, though nothing is wrong."""
+    print(f"note: {line}", file=sys.stderr)
+
+
 @contextmanager
 def escaping() -> Iterator[None]:
     """Within the block stdout and stderr are escaped: messages, warnings, tables, prompts, names out of files."""

@@ -1,13 +1,13 @@
 """`motionloom weights`: what a weight file holds, which ones ship, and older files as ones of today."""
 
-import argparse
 import json
+from argparse import Namespace
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from motionloom.cli.writing import check_overwriting
-from motionloom.errors import MotionloomError
+from motionloom.cli.writing import check_overwriting, fail
 from motionloom.io.atomic import check_place
 from motionloom.weights.adapter import read_adapter
 from motionloom.weights.container import ADAPTERS, PAIRS, PREDICTORS
@@ -19,18 +19,16 @@ TRAINING = "motionloom_train.convert"
 """The module that writes graphs, which needs PyTorch."""
 
 
-def run_weights(arguments: argparse.Namespace) -> None:
+def run_weights(arguments: Namespace) -> None:
     """``motionloom weights NAME``."""
 
     if arguments.weights[:1] == ["convert"]:
         _convert(arguments)
         return
     if len(arguments.weights) > 1:
-        raise MotionloomError(f"one weight file at a time; got {', '.join(arguments.weights)}")
+        fail(f"one weight file at a time; got {', '.join(arguments.weights)}")
     if arguments.prior is not None:
-        raise MotionloomError(
-            "--prior belongs to 'motionloom weights convert', which makes files of today from older ones"
-        )
+        fail("--prior belongs to 'motionloom weights convert', which makes files of today from older ones")
     if arguments.actions:
         _actions(arguments)
         return
@@ -50,31 +48,29 @@ def run_weights(arguments: argparse.Namespace) -> None:
     print(json.dumps(about, indent=1) if arguments.json else _card(about))
 
 
-def _convert(arguments: argparse.Namespace) -> None:
+def _convert(arguments: Namespace) -> None:
     """Write an older file again with graphs; raises MotionloomError where it cannot be, or PyTorch is missing."""
 
     if len(arguments.weights) != 3 or arguments.actions or arguments.json:
-        raise MotionloomError(
-            "say which file to read and which to write: motionloom weights convert OLD NEW.safetensors"
-        )
+        fail("say which file to read and which to write: motionloom weights convert OLD NEW.safetensors")
     old, new = map(Path, arguments.weights[1:])
     if new.suffix != ".safetensors":
-        raise MotionloomError(f"weights are written as .safetensors; {new.name} has another suffix")
+        fail(f"weights are written as .safetensors; {new.name} has another suffix")
     if not old.is_file():
-        raise MotionloomError(f"there is no file {old} to convert")
+        fail(f"there is no file {old} to convert")
     check_place(new)
     check_overwriting(arguments, [new], also=[old])
     convert = import_module(TRAINING).convert
     print(f"wrote {convert(old, new, prior=arguments.prior)}")
 
 
-def _actions(arguments: argparse.Namespace) -> None:
+def _actions(arguments: Namespace) -> None:
     """Print what a prior has learned; raises MotionloomError for weights that do not say."""
 
     weights = arguments.weights[0] if arguments.weights else "default"
     known = Prior.load(weights).known
     if known is None:
-        raise MotionloomError(
+        fail(
             f"the weights {weights!r} do not say what they have learned: they are older than "
             "such tables; their card says which recordings they know"
         )
@@ -96,73 +92,67 @@ def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     return about if name is None else about | {"name": name}
 
 
-def _prior(path: Path) -> dict[str, Any]:
+def _about(whole: Any, kind: str, variant: str, tensors: Mapping[str, Any], *, own: dict[str, Any]) -> dict[str, Any]:
+    """What is said of every kind of weights, and its ``own``; whole: what has their name, licence, data and notes."""
+    return {
+        "name": whole.name,
+        "kind": kind,
+        "licence": whole.licence,
+        "data": whole.data,
+        "variant": variant,
+        "parameters": sum(value.size for value in tensors.values()),
+        **own,
+        "notes": whole.notes,
+    }
 
+
+def _sizes(config: Any) -> dict[str, int]:
+    return {"layers": config.layers, "width": config.width, "heads": config.heads}
+
+
+def _sampled(whole: Prior | Predictor) -> dict[str, Any]:
+    schedule = {"name": whole.schedule.name, "steps": whole.schedule.steps}
+    return {"frames_per_second": whole.fps, "schedule": schedule}
+
+
+def _prior(path: Path) -> dict[str, Any]:
     prior = load_prior(path)
     config = prior.net.config
-    about = _network(prior, "prior", config.variant, sizes={"patch": config.patch}, seen={"features": config.features})
-    return about | {"text": prior.text.name, "notes": prior.card.notes}
+    own = {"sizes": _sizes(config) | {"patch": config.patch}, "features": config.features}
+    own |= _sampled(prior) | {"text": prior.text.name}
+    return _about(prior.card, "prior", config.variant, prior.net.weights, own=own)
 
 
 def _predictor(path: Path) -> dict[str, Any]:
-
     predictor = load_predictor(path)
-    frames = {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed}
-    seen = {"joints": list(predictor.layout.names), "frames": frames}
-    sizes = {"frequencies": predictor.net.config.kept}
-    return _network(predictor, "predictor", predictor.variant, sizes=sizes, seen=seen) | {"notes": predictor.card.notes}
-
-
-def _network(
-    whole: Prior | Predictor, kind: str, variant: str, *, sizes: dict[str, int], seen: dict[str, Any]
-) -> dict[str, Any]:
-    """What there is to say of both kinds of networks, with their own ``sizes`` and what they see of a motion."""
-    config = whole.net.config
-    return {
-        "name": whole.card.name,
-        "kind": kind,
-        "licence": whole.card.licence,
-        "data": whole.card.data,
-        "variant": variant,
-        "parameters": sum(value.size for value in whole.net.weights.values()),
-        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads} | sizes,
-        **seen,
-        "frames_per_second": whole.fps,
-        "schedule": {"name": whole.schedule.name, "steps": whole.schedule.steps},
+    config = predictor.net.config
+    own = {
+        "sizes": _sizes(config) | {"frequencies": config.kept},
+        "joints": list(predictor.layout.names),
+        "frames": {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed},
+        **_sampled(predictor),
     }
+    return _about(predictor.card, "predictor", predictor.variant, predictor.net.weights, own=own)
+
+
+def _belongs_to(part: Any) -> dict[str, Any]:
+    return {"belongs_to": {"name": part.base, "fingerprint": part.fingerprint}}
 
 
 def _block(path: Path) -> dict[str, Any]:
-
     block = read_block(path)
     config = block.config
-    return {
-        "name": block.name,
-        "kind": "two-person block",
-        "licence": block.licence,
-        "data": block.data,
-        "variant": "aware" if config.aware else f"corrects {config.adds}",
-        "parameters": sum(value.size for value in block.tensors.values()),
-        "sizes": {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads},
-        "belongs_to": {"name": block.base, "fingerprint": block.fingerprint},
-        "notes": block.notes,
-    }
+    sizes = {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads}
+    variant = "aware" if config.aware else f"corrects {config.adds}"
+    return _about(block, "two-person block", variant, block.tensors, own={"sizes": sizes} | _belongs_to(block))
 
 
 def _adapter(path: Path) -> dict[str, Any]:
-
     adapter = read_adapter(path)
-    return {
-        "name": adapter.name,
-        "kind": "taught adapter" if adapter.taught else "control adapter",
-        "licence": adapter.licence,
-        "data": adapter.data,
-        "variant": "low rank" if adapter.taught else f"low rank, {adapter.control}",
-        "parameters": sum(value.size for value in adapter.tensors.values()),
-        "sizes": {"rank": adapter.rank} | ({"given rank": adapter.given_rank} if adapter.sees_given else {}),
-        "belongs_to": {"name": adapter.base, "fingerprint": adapter.fingerprint},
-        "notes": adapter.notes,
-    }
+    sizes = {"rank": adapter.rank} | ({"given rank": adapter.given_rank} if adapter.sees_given else {})
+    kind = "taught adapter" if adapter.taught else "control adapter"
+    variant = "low rank" if adapter.taught else f"low rank, {adapter.control}"
+    return _about(adapter, kind, variant, adapter.tensors, own={"sizes": sizes} | _belongs_to(adapter))
 
 
 def _card(about: dict[str, Any]) -> str:

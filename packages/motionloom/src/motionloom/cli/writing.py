@@ -1,11 +1,11 @@
 """What the commands that write motions share about their files: unit, frame rate, what is there already."""
 
-import argparse
-import sys
+from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from motionloom.cli.terminal import note
 from motionloom.errors import MotionloomError
 
 if TYPE_CHECKING:
@@ -17,14 +17,14 @@ def fail(message: str) -> NoReturn:
     raise MotionloomError(message)
 
 
-def check_rate(arguments: argparse.Namespace) -> None:
+def check_rate(arguments: Namespace) -> None:
     """Refuse a ``--fps`` that cannot be."""
 
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         raise MotionloomError(f"--fps must be 1 to 1000; got {arguments.fps:g}")
 
 
-def check_unit(arguments: argparse.Namespace, files: Sequence[Path]) -> None:
+def check_unit(arguments: Namespace, files: Sequence[Path]) -> None:
     """Refuse an ``--out-unit`` where no BVH is written: the other formats state their unit."""
 
     if arguments.out_unit is not None and not any(file.suffix.lower() == ".bvh" for file in files):
@@ -36,7 +36,7 @@ def at_rate(motions: "Iterable[Motion]", fps: float | None) -> "list[Motion]":
     return [motion if fps is None else motion.resample(fps) for motion in motions]
 
 
-def check_overwriting(arguments: argparse.Namespace, files: Iterable[Path], *, also: Iterable[Path] = ()) -> None:
+def check_overwriting(arguments: Namespace, files: Iterable[Path], *, also: Iterable[Path] = ()) -> None:
     """Refuse to write over what is read; say so where another file is written over without ``--force``.
 
     ``also`` are files that are read and not on the line. Raises `MotionloomError` naming the file that is both.
@@ -49,10 +49,10 @@ def check_overwriting(arguments: argparse.Namespace, files: Iterable[Path], *, a
         if file.resolve() in read:
             raise MotionloomError(f"{file} is read and would be written over; give what is made another name")
         if not arguments.force:
-            print(f"note: {file} was there and is written over (--force says nothing)", file=sys.stderr)
+            note(f"{file} was there and is written over (--force says nothing)")
 
 
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
+def _inputs(arguments: Namespace) -> list[Path]:
     """The files that the line names to be read."""
     found: list[Any] = []
     for name, value in vars(arguments).items():

@@ -176,7 +176,7 @@ class Stage(ABC, Generic[Shown]):
             undo.log.insert(0, self._log.pop())
         self._restore(mark)
         for i, (person, state) in enumerate(zip(self.people, mark.people, strict=True)):
-            person.restore(replace(state, asked=()))  # what waited then was taken up since, or waits still
+            person.restore(replace(state, asked=deque()))  # what waited then was taken up since, or waits still
             for command in (*(one.command for one in undo.log if one.person == i), *undo.was.people[i].asked):
                 person.ask(command)
         return undo

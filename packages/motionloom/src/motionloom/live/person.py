@@ -1,11 +1,12 @@
 """One person of a live motion: what is asked of him, the frames sampled for him, and the body that was shown."""
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +15,25 @@ from motionloom.edits.heading import heading_for
 from motionloom.edits.steering import Correction, toward
 from motionloom.features.layout import FPS
 from motionloom.features.placed import PlacedMotion
-from motionloom.goals.goal import Goal, overlaid
+from motionloom.goals.goal import Goal, overlaid, turn_between
 from motionloom.goals.paths import WALKING
 from motionloom.ground import GroundPose
 from motionloom.live.body import body, put
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, scaled
-from motionloom.live.course import ARRIVED, Course, Trail, braking, steered
+from motionloom.live.course import (
+    ARRIVED,
+    SOON,
+    Course,
+    Target,
+    Trail,
+    braking,
+    must_go,
+    same_place,
+    steered,
+    way_to,
+    within_reach,
+)
 from motionloom.live.settings import Settings
-from motionloom.live.targets import SOON, Target, must_go, same_place, way_to, within_reach
-from motionloom.live.words import STANDS, for_pace, stays
 from motionloom.motion import Motion, ground_pose
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.long import last_frames
@@ -117,17 +128,17 @@ class _Due:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A person before some frame: all that changes while he moves."""
+    """A person before some frame: all that changes while he moves, by the names that it has in him."""
 
     plan: _Plan | None
     words: str
     steer: Steer
     trail: Trail | None
-    targets: tuple[Target, ...]
+    targets: deque[Target]
     goes_to: Target | None
     stands: int
-    due: tuple[_Due, ...]
-    asked: tuple[Command, ...]
+    due: deque[_Due]
+    asked: deque[Command]
 
 
 class Person(Asked):
@@ -176,25 +187,12 @@ class Person(Asked):
 
     def state(self) -> State:
         """What `restore` brings back."""
-        return State(
-            self._plan,
-            self._words,
-            self._steer,
-            copy(self._trail),
-            tuple(self._targets),
-            self._goes_to,
-            self._stands,
-            tuple(self._due),
-            tuple(self._asked),
-        )
+        return State(*(copy(getattr(self, f"_{one.name}")) for one in fields(State)))
 
     def restore(self, state: State) -> None:
         """Be as in a state; what was asked since is forgotten."""
-        self._plan, self._words, self._steer, self._trail = state.plan, state.words, state.steer, copy(state.trail)
-        self._targets = deque(state.targets, maxlen=MOST_ASKED)
-        self._goes_to, self._stands = state.goes_to, state.stands
-        self._due = deque(state.due, maxlen=MOST_ASKED)
-        self._asked = deque(state.asked)
+        for one in fields(State):
+            setattr(self, f"_{one.name}", copy(getattr(state, one.name)))
 
     def pose_at(self, frame: int) -> tuple[Array, Array, str]:
         """Root (3,), rotations (joints, 4) and words of a frame of the plan."""
@@ -377,3 +375,37 @@ def _course(known: PlacedMotion) -> Course:
     count = min(4, len(known))
     end, back = known.end, known.at(len(known) - count)
     return Course(end, ((end.x - back.x) / count, (end.z - back.z) / count))
+
+
+STANDS = "a person stands still"
+_FORWARD = (
+    (0.15, STANDS),
+    (1.9, "a person walks forward"),
+    (2.4, "a person jogs slowly"),
+    (math.inf, "a person runs forward"),
+)
+_BACKWARDS, _SIDEWAYS = "a person walks backwards", "a person walks sideways"
+
+
+_GOING = r"""walk\w*|runs?|running|jog\w*|sprint\w*|stroll\w*|march\w*|step\w*|skip\w*|hop\w*|jump\w*|crawl\w*|sneak\w*|
+    creep\w*|limp\w*|stagger\w*|wander\w*|danc\w*|goes|go|going|moves?|moving|rush\w*|hurr\w+|climb\w*|strid\w+"""
+_STAYING = r"""stands?|standing|stays?|staying|waits?|waiting|sits?|sitting|seated|lies?|lying|lays|laying|kneel\w*|
+    squat\w*|crouch\w*|sleep\w*|rests?|resting|falls?|falling|collaps\w+|freez\w+|(?:stops?|halts?)(?:\s+\w+ing)?"""
+_EITHER = re.compile(rf"\b(?:(?P<staying>{_STAYING})|{_GOING})\b", re.IGNORECASE | re.VERBOSE)
+
+
+def stays(words: str) -> bool:
+    """Whether words end with somebody who stays where he is: stands, sits or lies. The last of several verbs counts."""
+    found = list(_EITHER.finditer(words))
+    return bool(found) and found[-1]["staying"] is not None
+
+
+def for_pace(speed: float, direction: float | None, facing: float | None) -> str:
+    """speed: metres per second; direction, facing: radians in the world, None where they are one."""
+    words = next(words for most, words in _FORWARD if speed < most)
+    if words == STANDS or direction is None or facing is None:
+        return words
+    off = abs(float(turn_between(direction, facing)))
+    if off > math.radians(130):
+        return _BACKWARDS
+    return _SIDEWAYS if off > math.radians(50) else words

@@ -4,8 +4,7 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -58,27 +57,21 @@ class Session:
         return [robot.pose(motion_of([one], robot.fps)) for robot, one in zip(self.robots, people, strict=True)]
 
 
+@dataclass(eq=False)
 class Sessions:
     """All live sessions of one server; asked from any thread."""
 
-    def __init__(
-        self,
-        prior: Callable[[], Prior],
-        *,
-        block: Callable[[Prior], PairBlock] = lambda prior: PairBlock.load("duet", prior),
-        most: int = MOST,
-        settings: Settings | None = None,
-        robots: Mapping[str, Robot] = MappingProxyType({}),
-        now: Callable[[], float] = time.monotonic,
-    ) -> None:
-        """prior: gives the weights, called in the thread of the first session (it may take seconds). block: gives what
-        makes two people of them; `MotionloomError` where there is none for these weights. robots: those that a
-        client may name.
-        """
-        self._robots = robots
-        self._prior, self._block, self._most, self._settings, self._now = prior, block, most, settings, now
-        self._open: dict[str, Session] = {}
-        self._lock = threading.Lock()
+    prior: Callable[[], Prior]
+    """Gives the weights, called in the thread of the first session (it may take seconds)."""
+    _: KW_ONLY
+    block: Callable[[Prior], PairBlock] = lambda prior: PairBlock.load("duet", prior)
+    """Gives what makes two people of them; `MotionloomError` where there is none for these weights."""
+    most: int = MOST
+    settings: Settings | None = None
+    robots: Mapping[str, Robot] = field(default_factory=dict)
+    """Those that a client may name."""
+    _open: dict[str, Session] = field(default_factory=dict, init=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     def begin(self, asked: Hello) -> Session:
         """A new session, or the one that ``asked`` names; `MotionloomError` where there is no room or none such."""
@@ -87,8 +80,8 @@ class Sessions:
             if asked.session:
                 return self._again(asked.session)
             robots = self._followers(asked)
-            if len(self._open) >= self._most and not self._make_room():
-                raise MotionloomError(f"this server plays {self._most} live sessions and no more; come back later")
+            if len(self._open) >= self.most and not self._make_room():
+                raise MotionloomError(f"this server plays {self.most} live sessions and no more; come back later")
             asked = replace(asked, skeleton=robots[0].robot.skeleton) if robots else asked
             metre = robots[0].robot.metre if robots else 1.0
             session = Session(secrets.token_urlsafe(16), asked, self._player(asked, metre).start(), robots)
@@ -98,7 +91,7 @@ class Sessions:
     def leave(self, session: Session) -> None:
         """The client is gone; it may come back."""
         with self._lock:
-            session.left = self._now()
+            session.left = time.monotonic()
 
     def end(self, session: Session) -> None:
         """The session is over."""
@@ -118,18 +111,18 @@ class Sessions:
         """A robot for each of the people, where one is asked for."""
         if not asked.robot:
             return ()
-        if asked.robot not in self._robots:
-            there = ", ".join(self._robots) or "none (motionloom serve --robot MODEL)"
+        if asked.robot not in self.robots:
+            there = ", ".join(self.robots) or "none (motionloom serve --robot MODEL)"
             raise MotionloomError(f"this server has no robot {quoted(asked.robot)}; it has {there}")
         how = {"max_speed": asked.max_speed, "avoid_collisions": bool(asked.avoid_collisions)}
-        return tuple(Follower(self._robots[asked.robot], asked.fps, **how) for _ in range(asked.people))
+        return tuple(Follower(self.robots[asked.robot], asked.fps, **how) for _ in range(asked.people))
 
     def _player(self, asked: Hello, metre: float) -> Player[Any]:
-        prior = self._prior()
-        shown = {"fps": asked.fps, "skeleton": asked.skeleton, "metre": metre, "settings": self._settings}
+        prior = self.prior()
+        shown = {"fps": asked.fps, "skeleton": asked.skeleton, "metre": metre, "settings": self.settings}
         if asked.people == 1:
             return Player(Live(prior, seed=asked.seed, **shown))
-        return Player(LivePair(prior, self._block(prior), seed=asked.seed, **shown))
+        return Player(LivePair(prior, self.block(prior), seed=asked.seed, **shown))
 
     def _again(self, key: str) -> Session:
         session = self._open.get(key)
@@ -142,17 +135,18 @@ class Sessions:
 
     def _forget(self) -> None:
         """End sessions whose clients did not come back in time."""
-        for session in [one for one in self._open.values() if one.left is not None]:
-            if self._now() - (session.left or 0.0) > KEPT:
-                self._open.pop(session.key)
-                session.player.stop()
+        for left, session in self._waiting():
+            if time.monotonic() - left > KEPT:
+                self._open.pop(session.key).player.stop()
 
     def _make_room(self) -> bool:
         """End the session that has waited longest for its client, if any waits."""
-        waiting = [one for one in self._open.values() if one.left is not None]
-        if not waiting:
-            return False
-        oldest = min(waiting, key=lambda one: one.left or 0.0)
-        self._open.pop(oldest.key)
-        oldest.player.stop()
-        return True
+        waiting = self._waiting()
+        if waiting:
+            self._open.pop(waiting[0][1].key).player.stop()
+        return bool(waiting)
+
+    def _waiting(self) -> list[tuple[float, Session]]:
+        """Sessions without a client, and when it was lost, the longest ago first."""
+        waiting = [(one.left, one) for one in self._open.values() if one.left is not None]
+        return sorted(waiting, key=lambda pair: pair[0])

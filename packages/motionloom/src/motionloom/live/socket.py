@@ -62,8 +62,10 @@ async def live_session(websocket: Socket, sessions: Sessions) -> None:
         await _close(websocket, GOODBYE)
     except (MotionloomError, TimeoutError) as error:
         said = str(error) or "nothing was said in time"
+        with suppress(Gone):
+            await _send(websocket, {"type": "error", "message": one_line(said)[:300], "last": True})
         code = TRY_LATER if "come back later" in said else NOT_ALLOWED
-        await _farewell(websocket, code, said)
+        await _close(websocket, code, one_line(said)[:100])
     except Gone:
         pass
     finally:
@@ -119,7 +121,6 @@ async def _followed(websocket: Socket, session: Session, said: Mapping[str, Any]
 
 
 async def _play(websocket: Socket, session: Session) -> None:
-    """Send poses at their times."""
     player = session.player
     pace, reported = Pace(time.monotonic, lambda: player.health.rate), time.monotonic()
     while True:
@@ -162,12 +163,6 @@ async def _send(websocket: Socket, said: Mapping[str, Any]) -> None:
             await websocket.send_text(text)
     except Exception as error:
         raise Gone from error
-
-
-async def _farewell(websocket: Socket, code: int, said: str) -> None:
-    with suppress(Gone):
-        await _send(websocket, {"type": "error", "message": one_line(said)[:300], "last": True})
-    await _close(websocket, code, one_line(said)[:100])
 
 
 async def _close(websocket: Socket, code: int, reason: str | None = None) -> None:

@@ -5,9 +5,9 @@ from typing import Any
 
 from motionloom.requests.export import OnSkeleton
 from motionloom.requests.fields import declare, like
-from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import PairSampling, Sampling
 from motionloom.requests.shared import LONGEST_PROMPT, Finish, OnRobot
+from motionloom.requests.tasks import Generate
 
 TASKS = ("generate", "control", "compose", "duet", "export")
 

@@ -24,20 +24,19 @@ from motionloom.requests.fields import specs
 from motionloom.requests.reading import parse_fields, read
 from motionloom.retarget.named import NAMED
 from motionloom.server import page as built
-from motionloom.server.bodies import body_of, file_of
+from motionloom.server.bodies import body_of, file_of, file_once
 from motionloom.server.films import film
 from motionloom.server.guard import Door, Guard
 from motionloom.server.job_request import TASKS, read_request
+from motionloom.server.jobs import EventStream, Streams
 from motionloom.server.limits import Limits
 from motionloom.server.mmcp.routes import capabilities_of
 from motionloom.server.mmcp.routes import routes as mmcp_routes
 from motionloom.server.openapi import as_page, document
-from motionloom.server.outgoing import file_once
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal, full_disk
 from motionloom.server.saved import Saved
 from motionloom.server.saved import routes as project_routes
-from motionloom.server.streaming import EventStream, Streams
 from motionloom.server.timelines import sentence_json, timeline_json, timeline_yaml
 from motionloom.server.worker import Worker
 from motionloom.skeleton import SMPL22

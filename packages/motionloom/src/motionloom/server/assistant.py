@@ -177,11 +177,8 @@ async def _or_refusal(call: Any) -> Any:
     """What a call gives; a refusal as the sentence that it is."""
     try:
         return await call
-    except Refusal as refusal:
-        sentence = refusal.sentence
-    except MotionloomError as error:
-        sentence = str(error)
-    raise import_module("mcp.server.mcpserver.exceptions").ToolError(sentence)
+    except (Refusal, MotionloomError) as error:
+        raise import_module("mcp.server.mcpserver.exceptions").ToolError(str(error)) from None
 
 
 def run(folder: Path, *, weights: str = "default", device: str = "cpu", adapters: Sequence[Applied] = ()) -> None:

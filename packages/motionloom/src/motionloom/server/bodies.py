@@ -1,11 +1,18 @@
-"""Bodies of requests: read piece by piece, never more of them than is allowed, never for longer than is allowed."""
+"""Bodies of requests and files that are answered, piece by piece.
+
+Of a request never more is read than is allowed, and never for longer; a file of one answer is gone from the folder
+before the first byte is sent.
+"""
 
 import asyncio
+import os
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response, StreamingResponse
 
 from motionloom.io.text import shown
 from motionloom.server.limits import Limits
@@ -16,10 +23,10 @@ CLOSE = {"Connection": "close"}
 """The rest of a body that is refused is not read: the connection ends."""
 
 
-async def body_of(request: Request, most: int, *, seconds: float = Limits.body_seconds) -> bytes:
+async def body_of(request: Request, most: int) -> bytes:
     """The whole body; raises `Refusal` for one that is too large, too slow or not whole."""
     data = bytearray()
-    async for piece in _pieces(request, most, seconds):
+    async for piece in _pieces(request, most, Limits.body_seconds):
         data += piece
     return bytes(data)
 
@@ -76,3 +83,30 @@ def _too_large(size: int, most: int) -> Refusal:
     return Refusal(
         413, f"a body of {size / 1e6:.1f} MB is not read; at most {most / 1e6:.1f} MB are taken here", headers=CLOSE
     )
+
+
+PIECE = 1 << 18
+"""Bytes that are read at once."""
+
+
+def file_once(part: Path, *, media_type: str, name: str) -> Response:
+    """The answer that sends ``part`` as a download called ``name``.
+
+    The file loses its name here and is read through the open descriptor, so that nothing is left of it whatever becomes
+    of the client.
+    """
+    file = part.open("rb")
+    with suppress(PermissionError):  # Windows keeps the name of an open file; it goes behind the last byte
+        part.unlink()
+
+    async def pieces() -> AsyncIterator[bytes]:
+        try:
+            while piece := await run_in_threadpool(file.read, PIECE):
+                yield piece
+        finally:
+            file.close()
+            part.unlink(missing_ok=True)
+
+    size = os.fstat(file.fileno()).st_size
+    headers = {"Content-Length": str(size), "Content-Disposition": f'attachment; filename="{name}"'}
+    return StreamingResponse(pieces(), media_type=media_type, headers=headers)

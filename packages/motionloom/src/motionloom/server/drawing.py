@@ -1,4 +1,4 @@
-"""A `JobRequest` to motions, by `motionloom.tasks.run`, and its poses while they are computed."""
+"""A `JobRequest` to motions, by `motionloom.tasks.run`; remarks on its words, and its poses while they are computed."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -9,18 +9,22 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import Goal, start_of
+from motionloom.goals.remarks import Remark, numbers_read, parts_read, remarks_on, remarks_on_two
 from motionloom.io import load
 from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.server.job_request import JobRequest
 from motionloom.tasks import run as tasks
 from motionloom.tasks import text
+from motionloom.tasks.direct_edits import is_only_head_free
 from motionloom.tasks.run import Models, Plan, Result, run, run_each
 from motionloom.tasks.sampling import Progress
 
 Array = NDArray[np.float64]
 
 RATE = 20.0
+MOST_TEXTS = 64
+"""Texts of one job that are looked at for remarks."""
 
 
 def draw(models: Models, request: JobRequest, progress: Progress) -> Iterator[Result]:
@@ -68,6 +72,25 @@ def plan_of(request: JobRequest) -> Plan:
         taught=request.taught,
         previous=request.kept,
     )
+
+
+def remarks_of(models: Models, request: JobRequest) -> list[Remark]:
+    """Remarks on the words of a request: numbers and actions read in them, words that nobody learned.
+
+    Raises `MotionloomError` where a text cannot be encoded.
+    """
+    if request.call is not None or request.task in ("predict", "switch"):
+        return []
+    timeline, prior = request.timeline, models.prior
+    texts = [request.prompt] if timeline is None else [segment.text for segment in timeline.segments]
+    texts = list(dict.fromkeys(texts))[:MOST_TEXTS]
+    if request.task == "edit" and is_only_head_free(request.values.keep):
+        return []
+    if request.task == "duet":
+        return remarks_on_two(texts, models.block.known, prior.known, prior.text)
+    read = [] if timeline is None or request.task != "generate" else [numbers_read(timeline), parts_read(timeline)]
+    remarks = [Remark(request.prompt, line) for line in read if line]
+    return remarks + remarks_on(texts, prior.known, prior.text)
 
 
 def batch_key(request: JobRequest) -> tuple[Any, ...] | None:

@@ -8,8 +8,8 @@ of a GIF are in a file until the last one has come, because its palette is of al
 import asyncio
 import io
 import json
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from motionloom.errors import MotionloomError, one_line
 from motionloom.goals.fields import Field
 from motionloom.io.text import parse_json
-from motionloom.server.outgoing import PIECE
+from motionloom.server.bodies import PIECE
 from motionloom.server.refusal import full_disk
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ MAX_GIF_BYTES = 1 << 30
 MOST = 2
 """Films that are written at the same time."""
 GOODBYE, REFUSED = 1000, 1008
-_writing = 0
+_ROOM = asyncio.Semaphore(MOST)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,9 @@ async def film(websocket: WebSocket) -> None:
             asked = read(message.get("text") or "", studio.limits.total_seconds)
             part = studio.project.part(f".{asked.format}")
             try:
-                async with _room():
+                if _ROOM.locked():
+                    raise MotionloomError(f"{MOST} films are being written already; wait until one of them is done")
+                async with _ROOM:
                     await asyncio.to_thread(_write, _Pictures(websocket, asked, studio.limits.body_seconds), part)
                 await _send(websocket, part)
             finally:
@@ -118,18 +120,6 @@ def _whole(field: Field) -> int:
     if value != int(value):
         field.wrong("a whole number")
     return int(value)
-
-
-@asynccontextmanager
-async def _room() -> AsyncIterator[None]:
-    global _writing
-    if _writing >= MOST:
-        raise MotionloomError(f"{MOST} films are being written already; wait until one of them is done")
-    _writing += 1
-    try:
-        yield
-    finally:
-        _writing -= 1
 
 
 class _Pictures:

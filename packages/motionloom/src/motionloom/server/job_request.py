@@ -245,14 +245,9 @@ class _Reader:
 
     def with_goal(self, found: JobRequest, usual: float) -> JobRequest:
         """The request with its length and goals."""
-        from motionloom.goals.goal_file import read_goal
-
         seconds = usual if found.values.seconds is None else found.values.seconds
         frames = max(round(seconds * 20), FEWEST)
-        value = self.given["goals"]
-        if not isinstance(value, Mapping):
-            Field(value, "goals").wrong("a mapping, as a goal file holds it")
-        goal = read_goal(value, frames=frames, folder=self.project.motions)
+        goal = self.goal("goals", frames)
         return replace(found, seconds=seconds, goal=goal, parts=self.parts(frames), other_goal=self.other_goal(frames))
 
     def has_goals(self) -> bool:
@@ -261,14 +256,16 @@ class _Reader:
         return "goals" in self.given or (isinstance(timeline, Mapping) and "path" in timeline)
 
     def other_goal(self, frames: int) -> "Goal | None":
-        """What the other of two people is asked."""
+        """The goals of the other of two people."""
+        return self.goal("other_goals", frames) if "other_goals" in self.given else None
+
+    def goal(self, key: str, frames: int) -> "Goal":
+        """The goals of a key."""
         from motionloom.goals.goal_file import read_goal
 
-        if "other_goals" not in self.given:
-            return None
-        value = self.given["other_goals"]
+        value = self.given[key]
         if not isinstance(value, Mapping):
-            Field(value, "other_goals").wrong("a mapping, as a goal file holds it")
+            Field(value, key).wrong("a mapping, as a goal file holds it")
         return read_goal(value, frames=frames, folder=self.project.motions)
 
     def parts(self, frames: int) -> "tuple[tuple[str, Goal], ...]":

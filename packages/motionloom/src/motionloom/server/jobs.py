@@ -5,20 +5,25 @@ written out once, by the thread in which it happens, and every stream sends the 
 stream that is slow finds fewer levels in the log, never a longer one, and holds one event at a time.
 """
 
+import asyncio
 import base64
 import json
 import secrets
 import threading
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from starlette.responses import StreamingResponse
+from starlette.types import Receive, Scope, Send
 
 from motionloom.goals.remarks import Remark
 from motionloom.server.job_request import JobRequest
+from motionloom.server.refusal import Refusal
 
 FINAL = ("done", "failed", "cancelled")
 
@@ -110,7 +115,7 @@ class Job:
             self._levels.append(event)
             self.log_bytes += len(event.text)
             while self.log_bytes > self.most_bytes and self._levels:
-                self._drop()
+                self.log_bytes -= len(self._levels.popleft().text)
         self._tell()
 
     def add_result(self, result: dict[str, Any]) -> None:
@@ -139,29 +144,48 @@ class Job:
             found = (event for event in (level, self._progress, self._final) if event and event.number > number)
             return min(found, key=lambda event: event.number, default=None)
 
-    def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call ``listener``, in any thread, whenever something happens; gives what ends that."""
+    @contextmanager
+    def listening(self, listener: Callable[[], None]) -> Iterator[None]:
+        """Within the block ``listener`` is called, in any thread, whenever something happens."""
         with self._lock:
             self._listeners.add(listener)
-        return lambda: self._listeners.discard(listener)
+        try:
+            yield
+        finally:
+            self._listeners.discard(listener)
+
+    @contextmanager
+    def news(self) -> Iterator[asyncio.Event]:
+        """An event of the running loop that is set whenever something happens in the block."""
+        loop, woken = asyncio.get_running_loop(), asyncio.Event()
+
+        def wake() -> None:
+            with suppress(RuntimeError):  # the server is going down
+                loop.call_soon_threadsafe(woken.set)
+
+        with self.listening(wake):
+            yield woken
 
     def wait(self) -> None:
         """Block until the job has ended."""
-        ended = threading.Event()
-        stop = self.listen(ended.set)
-        while not self.finished:
-            ended.wait()
-            ended.clear()
-        stop()
+        news = threading.Event()
+        with self.listening(news.set):
+            while not self.finished:
+                news.wait()
+                news.clear()
+
+    async def ended(self) -> None:
+        """The same for the running loop."""
+        with self.news() as news:
+            while not self.finished:
+                await news.wait()
+                news.clear()
 
     def forget_levels(self) -> None:
         """Drop the levels of the log."""
         with self._lock:
             self._levels.clear()
             self.log_bytes = 0
-
-    def _drop(self) -> None:
-        self.log_bytes -= len(self._levels.popleft().text)
 
     def _event(self, kind: str, data: str) -> Event:
         self._number += 1
@@ -173,3 +197,50 @@ class Job:
             listeners = tuple(self._listeners)
         for listener in listeners:
             listener()
+
+
+BEAT = 15.0
+"""Seconds after which a silent stream says that it is still there."""
+
+
+class Streams:
+    """How many event streams are open, and how many may be."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.open = most, 0
+
+
+class EventStream(StreamingResponse):
+    """The answer that streams a job's events behind number ``after``; `Refusal` where too many are open."""
+
+    def __init__(self, job: Job, after: int, streams: Streams) -> None:
+        headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+        super().__init__(events(job, after), media_type="text/event-stream", headers=headers)
+        self._streams = streams
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if self._streams.open >= self._streams.most:
+            raise Refusal(503, f"{self._streams.most} event streams are open already; close some")
+        self._streams.open += 1  # before anything is waited for, so that no burst passes the limit
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._streams.open -= 1
+
+
+async def events(job: Job, after: int) -> AsyncIterator[bytes]:
+    """The job's events behind number ``after``, until its end."""
+    with job.news() as woken:
+        yield b"retry: 1000\n\n"
+        while True:
+            woken.clear()
+            while (event := job.event_after(after)) is not None:
+                after = event.number
+                yield event.text
+                if event.kind in FINAL:
+                    return
+                await asyncio.sleep(0)  # a client that takes all it gets leaves others their turn
+            try:
+                await asyncio.wait_for(woken.wait(), BEAT)
+            except TimeoutError:
+                yield b": still there\n\n"

@@ -1,13 +1,13 @@
 """How much one server takes: every number that a request is refused by, in one place."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 
 from motionloom.requests.shared import LONGEST
 
 
 @dataclass(frozen=True)
-class Limits:
-    """Bounds of requests, of the queue and of the project folder."""
+class PublicLimits:
+    """Those that `/capabilities` reports."""
 
     seconds: float = LONGEST
     """Of one motion of one prompt."""
@@ -28,6 +28,14 @@ class Limits:
     queue: int = 256
     """Jobs that wait, of all clients together."""
     queue_per_client: int = 64
+    people: int = 8
+    """People of one file that is sent."""
+
+
+@dataclass(frozen=True)
+class Limits(PublicLimits):
+    """Bounds of requests, of the queue and of the project folder."""
+
     clients: int = 128
     """Clients with jobs that wait."""
     streams: int = 128
@@ -43,8 +51,6 @@ class Limits:
     """Bytes of them, and of characters."""
     uploads: int = 200
     """Characters and ASF skeletons in the project folder."""
-    people: int = 8
-    """People of one file that is sent."""
     body_seconds: float = 60.0
     """In which a body must have arrived."""
     connections: int = 512
@@ -59,18 +65,5 @@ class Limits:
     """Files that are made at the same time."""
 
     def public(self) -> dict[str, float]:
-        """What `/capabilities` says of them."""
-        names = (
-            "seconds",
-            "total_seconds",
-            "count",
-            "steps",
-            "prompt",
-            "body_bytes",
-            "upload_bytes",
-            "project_bytes",
-            "queue",
-            "queue_per_client",
-            "people",
-        )
-        return {name: value for name, value in asdict(self).items() if name in names}
+        """What `/capabilities` reports."""
+        return {one.name: getattr(self, one.name) for one in fields(PublicLimits)}

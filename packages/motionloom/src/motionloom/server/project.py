@@ -98,7 +98,10 @@ class Project:
             raise MotionloomError(
                 f"the project folder {folder} cannot be used: {error.strerror or error}; name another with --project"
             ) from None
-        self._sizes = {p.name: p.stat().st_size for p in sorted(self.motions.iterdir(), key=_age)}
+        self._sizes = {
+            p.name: p.stat().st_size
+            for p in sorted(self.motions.iterdir(), key=lambda p: (p.stat().st_mtime_ns, p.name))
+        }
         self._order = [name[:-5] for name in self._sizes if name.endswith(".json")]
 
     def part(self, suffix: str = "") -> Path:
@@ -163,13 +166,9 @@ class Project:
 
     def _about(self, name: str) -> tuple[dict[str, Any], int]:
         """What is known of a motion, and how many people are in it."""
-        try:
-            about = parse_json((self.motions / f"{name}.json").read_bytes(), name)
-        except OSError:
-            raise Refusal(404, f"there is no motion {name}; it was never made, or made room for newer ones") from None
-        except MotionloomError:
-            about = {}
-        about = about if isinstance(about, dict) else {}
+        about = _mapping(self.motions / f"{name}.json")
+        if about is None:
+            raise Refusal(404, f"there is no motion {name}; it was never made, or made room for newer ones")
         count = about.pop("people", None)
         if not isinstance(count, int) or not 1 <= count <= self.limits.people:
             raise Refusal(404, f"what is known of motion {name} is damaged; make it anew")
@@ -214,11 +213,8 @@ class Project:
     def character(self, name: Any) -> tuple[Path, str]:
         """The file of that id and its name; raises `Refusal` 404 where there is none."""
         if isinstance(name, str) and ID.fullmatch(name):
-            try:
-                about = parse_json((self.characters / f"{name}.json").read_bytes(), name)
-            except (OSError, MotionloomError):
-                about = None
-            if isinstance(about, dict) and about.get("suffix") in CHARACTERS and isinstance(about.get("name"), str):
+            about = _mapping(self.characters / f"{name}.json") or {}
+            if about.get("suffix") in CHARACTERS and isinstance(about.get("name"), str):
                 place = self.characters / f"{name}{about['suffix']}"
                 if place.is_file():
                     return place, about["name"]
@@ -226,11 +222,7 @@ class Project:
 
     def named_joints(self, name: str) -> dict[str, str]:
         """The joints of a character that somebody named, of the 22 by name."""
-        try:
-            about = parse_json((self.characters / f"{name}.json").read_bytes(), name)
-        except (OSError, MotionloomError):
-            return {}
-        found = about.get("joints", {}) if isinstance(about, dict) else {}
+        found = (_mapping(self.characters / f"{name}.json") or {}).get("joints", {})
         return {str(part): str(joint) for part, joint in found.items()} if isinstance(found, dict) else {}
 
     # -- the project's JSON
@@ -277,9 +269,16 @@ class Project:
                 os.fsync(file.fileno())
 
 
+def _mapping(path: Path) -> dict[str, Any] | None:
+    """The JSON object of a file, empty where it is damaged; None where there is no file."""
+    try:
+        found = parse_json(path.read_bytes(), path.name)
+    except OSError:
+        return None
+    except MotionloomError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def _file(name: str, number: int) -> str:
     return f"{name}.npz" if number == 0 else f"{name}.{number + 1}.npz"
-
-
-def _age(path: Path) -> tuple[int, str]:
-    return path.stat().st_mtime_ns, path.name

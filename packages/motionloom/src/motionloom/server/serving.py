@@ -68,7 +68,8 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     live = _Live(worker, read_robots(options.robots))
     app = build(project, worker, known, more=[WebSocketRoute("/live", live.answer)])
     bound = _bound(options.host, options.port)
-    address = _address(options.host, bound.getsockname()[1], token)
+    host = f"[{options.host}]" if ":" in options.host else options.host
+    address = f"http://{host}:{bound.getsockname()[1]}/" + (f"?token={token}" if token else "")
     print(f"motionloom: {address} (project: {project.folder})", file=sys.stderr, flush=True)
     if options.show and page.files():
         threading.Timer(0.3, webbrowser.open, [address]).start()
@@ -157,8 +158,3 @@ def _bound(host: str, port: int) -> socket.socket:
             f"cannot serve at {host}, port {port}: {problem}; name another --port or --host"
         ) from None
     return made
-
-
-def _address(host: str, port: int, token: str | None) -> str:
-    shown = f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")

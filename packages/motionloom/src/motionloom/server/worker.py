@@ -168,8 +168,7 @@ class Worker:
         return Refusal(500, f"the server failed ({what}); this is a fault of the program")
 
     def _finish(self, models: "Models", jobs: Sequence[Job], progress: Callable[[int, int], None]) -> None:
-        from motionloom.server.drawing import batch_key, draw, draw_together
-        from motionloom.server.remarks import remarks_of
+        from motionloom.server.drawing import batch_key, draw, draw_together, remarks_of
 
         for job in jobs:
             job.remarks = remarks_of(models, job.request)

@@ -19,10 +19,10 @@ from motionloom.features.layout import FPS, WIDTH
 from motionloom.features.placed import PlacedMotion
 from motionloom.goals.heads import read_head
 from motionloom.motion import Motion
-from motionloom.requests.edit import Edit
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
+from motionloom.requests.tasks import Edit
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.direct_edits import (
     Look,

@@ -22,8 +22,8 @@ from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.goals.mask_file import fixes_everything
 from motionloom.goals.schemas import MASK_JOINTS
 from motionloom.motion import Motion
-from motionloom.requests.predict import DAY
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
+from motionloom.requests.tasks import DAY
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import CONTEXT, FUTURES, Known, Past, WindowSampler, window_count

@@ -202,7 +202,7 @@ def paint_body(
         return
     places = shape.places[frame]
     seen, depth, scale = camera.see(places)
-    parts: list[tuple[float, list[float], list[float] | None, Colour]] = []
+    parts: list[tuple[float, list[float], list[float], Colour]] = []
     a, b = (np.array([bone[k] for bone in shape.bones], dtype=int) for k in (0, 1))
     radius_a, radius_b = shape.radii[:, 0] * scale[a], shape.radii[:, 1] * scale[b]
     edge = max(1.0, 0.0052 * shape.height * float(scale[shape.centre]))
@@ -224,8 +224,7 @@ def paint_body(
     parts += _head_parts(camera, shape, frame, edge, skin=skin)
     for _, outside, inside, colour in sorted(parts, key=lambda part: -part[0]):
         pen.polygon(outside, fill=mix(colour, INK, 0.55))
-        if inside is not None:
-            pen.polygon(inside, fill=colour)
+        pen.polygon(inside, fill=colour)
 
 
 def _flat(points: list[tuple[float, float]]) -> list[float]:
@@ -262,8 +261,8 @@ def _head_parts(
     nose = middle + radius * 0.98 * gaze
     parts: list[tuple[float, list[float], list[float], Colour]] = []
     nose_colour = mix(SKIN, LEFT, 0.45) if skin == SKIN else mix(skin, INK, 0.35)
-    for point, r, colour, nearer in ((middle, radius, skin, 0.0), (nose, 0.3 * radius, nose_colour, 0.0)):
+    for point, r, colour in ((middle, radius, skin), (nose, 0.3 * radius, nose_colour)):
         seen, depth, scale = camera.see(point[None])
-        outlines = [_flat(hull(seen, np.array([r * scale[0] + e]))) for e in (edge, 0.0)]
-        parts.append((float(depth[0]) - nearer, outlines[0], outlines[1], colour))
+        outer, inner = (_flat(hull(seen, np.array([r * scale[0] + e]))) for e in (edge, 0.0))
+        parts.append((float(depth[0]), outer, inner, colour))
     return parts

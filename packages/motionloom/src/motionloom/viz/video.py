@@ -1,4 +1,4 @@
-"""Pictures and films of motions: a contact sheet as PNG, a film as MP4 or GIF. No display is needed.
+"""Pictures and films of motions: a contact sheet or a grid as PNG, a film as MP4 or GIF. No display is needed.
 
 Orange is the person's left, blue the right, grey the middle; a bone that stands on the floor is green.
 The floor's tiles are half a metre wide and stay in the world, so a sliding foot shows.
@@ -16,7 +16,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
 from motionloom.viz import draw
-from motionloom.viz.draw import Camera
+from motionloom.viz.draw import Camera, Colour
 from motionloom.viz.figure import Figure, figure
 from motionloom.viz.film import MAX_PIXELS, caption, film_rate, film_size, font, shorten, suffixed, write_film
 from motionloom.viz.scene import smoothed
@@ -24,6 +24,14 @@ from motionloom.viz.scene import smoothed
 Array = NDArray[np.float64]
 CELL = (176, 236)  # one pose on a sheet, pixels
 TITLE = 46  # height of a row's caption, pixels
+POSE = (76, 112)
+"""Pixels of one pose of a grid."""
+CAPTION = 20
+"""Height of a caption of a grid, pixels."""
+GAP = 8
+MOST = 400
+"""Motions of one grid."""
+COLOURS = 255
 
 
 # --- contact sheets -----------------------------------------------------------------------------------------------
@@ -179,19 +187,14 @@ def _film(
         for i, shape in enumerate(shapes):
             frame = min(k, len(shape) - 1)
             tile = _scene(shape, frame, cameras[i][frame])
-            _title(tile, texts[i])
+            letters = 18 if tile.width > 400 else 13
+            title = shorten(texts[i], letters, tile.width - 24)
+            ImageDraw.Draw(tile).text((12, 10), title, fill=draw.INK, font=font(letters))
             picture.paste(tile, (panel[0] * (i % columns), panel[1] * (i // columns)))
         clock = f"{k / shapes[0].fps:.1f} / {seconds:.1f} s"
         pen = ImageDraw.Draw(picture)
         pen.text((size[0] - 12, size[1] - 10), clock, fill=draw.QUIET, font=font(15), anchor="rs")
         yield picture
-
-
-def _title(tile: Image.Image, text: str) -> None:
-    big = 18 if tile.width > 400 else 13
-    if text:
-        line = shorten(text, big, tile.width - 24)
-        ImageDraw.Draw(tile).text((12, 10), line, fill=draw.INK, font=font(big))
 
 
 def _follow(shape: Figure, panel: tuple[int, int]) -> list[Camera]:
@@ -203,13 +206,14 @@ def _follow(shape: Figure, panel: tuple[int, int]) -> list[Camera]:
     return [Camera(np.array([x, camera.target[1], z]), panel, span, camera.azimuth) for x, _, z in glide]
 
 
-def _scene(person: Figure, now: int, camera: Camera) -> Image.Image:
-    """One picture: floor, path, shadow and body."""
+def _scene(person: Figure, now: int, camera: Camera, *, ahead: bool = True) -> Image.Image:
+    """One picture: floor, path, shadow and body; ``ahead``: with the path that is still to come."""
     big = (camera.size[0] * draw.SMOOTH, camera.size[1] * draw.SMOOTH)
     picture = Image.new("RGB", big, draw.PAPER)
     pen = ImageDraw.Draw(picture)
     draw.paint_floor(pen, camera, person.floor)
-    draw.paint_path(pen, camera, person.path[now:], draw.mix(draw.PATH, draw.PAPER, 0.72), 0.014)
+    if ahead:
+        draw.paint_path(pen, camera, person.path[now:], draw.mix(draw.PATH, draw.PAPER, 0.72), 0.014)
     draw.paint_path(pen, camera, person.path[: now + 1], draw.PATH, 0.02)
     draw.paint_shadow(picture, camera, person, now)
     draw.paint_body(pen, camera, person, now)
@@ -222,3 +226,82 @@ def _captions(motions: Sequence[Motion], captions: Sequence[str] | None) -> list
     if captions is not None and len(captions) != len(motions):
         raise MotionloomError(f"{len(motions)} motions need as many captions; got {len(captions)}")
     return [caption(c) for c in captions] if captions is not None else [""] * len(motions)
+
+
+# --- grids --------------------------------------------------------------------------------------------------------
+
+
+def draw_grid(
+    motions: Sequence[Motion],
+    path: str | Path,
+    *,
+    captions: Sequence[str],
+    marks: Sequence[Colour | None] = (),
+    poses: int = 6,
+    columns: int = 4,
+) -> Path:
+    """Write a PNG: a tile per motion with its caption and ``poses`` poses over its whole time, side by side.
+
+    Every tile has a camera of its own, at three quarters from the front of the first pose, that holds all of its poses;
+    each pose is drawn over the same spot, with the floor's tiles of the world below it. The palette is reduced, so that
+    a hundred motions stay below two megabytes.
+
+    Args:
+        motions: what to draw, at most 400.
+        path: a name that ends in .png.
+        captions: a line per motion.
+        marks: a colour for the bar before a caption, or None for no bar; empty: none at all.
+        poses: poses per motion, 2 to 20.
+        columns: tiles side by side, 1 to 12.
+
+    Raises:
+        MotionloomError: no motions or too many, counts that do not agree, or a path that cannot be written.
+    """
+    if not 1 <= len(motions) <= MOST:
+        raise MotionloomError(f"a grid shows 1 to {MOST} motions; got {len(motions)}")
+    if len(captions) != len(motions) or len(marks) not in (0, len(motions)):
+        raise MotionloomError(
+            f"{len(motions)} motions need as many captions and marks; got {len(captions)}, {len(marks)}"
+        )
+    if not (2 <= poses <= 20 and 1 <= columns <= 12):
+        raise MotionloomError(f"a grid has 2 to 20 poses and 1 to 12 columns; got {poses} and {columns}")
+    target = suffixed(path, (".png",))
+    wide, tall = POSE[0] * poses + GAP, POSE[1] + CAPTION + GAP
+    columns = min(columns, len(motions))
+    sheet = Image.new("RGB", (wide * columns + GAP, tall * -(-len(motions) // columns) + GAP), (255, 255, 255))
+    for k, (motion, text) in enumerate(zip(motions, captions, strict=True)):
+        tile = _tile(figure(motion), caption(text), poses, marks[k] if marks else None)
+        sheet.paste(tile, (GAP + wide * (k % columns), GAP + tall * (k // columns)))
+    with atomic_path(target) as temp:
+        sheet.quantize(COLOURS, dither=Image.Dither.NONE).save(temp, format="PNG", optimize=True)
+    return Path(path)
+
+
+def _tile(shape: Figure, text: str, poses: int, mark: Colour | None) -> Image.Image:
+    tile = Image.new("RGB", (POSE[0] * poses, POSE[1] + CAPTION), draw.PAPER)
+    frames = np.linspace(0, len(shape) - 1, poses).round().astype(int)
+    camera = _grid_camera(shape, frames)
+    for column, frame in enumerate(frames.tolist()):
+        here = np.array([shape.path[frame, 0], camera.target[1], shape.path[frame, 2]])
+        moved = Camera(here, POSE, camera.span, camera.azimuth, camera.elevation)
+        tile.paste(_scene(shape, frame, moved, ahead=False), (POSE[0] * column, CAPTION))
+    pen = ImageDraw.Draw(tile)
+    if mark is not None:
+        pen.rectangle((0, 0, 5, CAPTION - 3), fill=mark)
+    clock = f"{shape.seconds:.1f} s"
+    room = tile.width - 14 - font(12).getlength(clock)
+    pen.text((10, 3), shorten(text, 13, room - 8), fill=draw.INK, font=font(13))
+    pen.text((tile.width - 4, 4), clock, fill=draw.QUIET, font=font(12), anchor="ra")
+    return tile
+
+
+def _grid_camera(shape: Figure, frames: np.ndarray) -> Camera:
+    """Looks at three quarters at the first pose; its span holds every pose, each over its own place on the floor."""
+    around = shape.places[frames] - shape.path[frames, None]
+    top = max(float(around[..., 1].max()) + 0.12 * shape.height, 0.6 * shape.height)
+    low = min(float(around[..., 1].min()), 0.0)
+    azimuth = float(np.arctan2(shape.forward[0, 0], shape.forward[0, 2])) - 0.75
+    trial = Camera(np.zeros(3), POSE, 1.0, azimuth)
+    wide = 2 * float(np.abs(around @ trial.axes()[0]).max()) + 0.15 * shape.height
+    span = max(1.02 * (top - low) + 0.12 * shape.height, wide * POSE[1] / POSE[0])
+    return Camera(np.array([0.0, shape.floor + (top + low) / 2, 0.0]), POSE, span, azimuth)

@@ -73,7 +73,8 @@ def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Aske
         elif one.type == "effector_target":
             goal = merged(goal, _target(one, nearest, size, clock))
             if one.rotations is not None:
-                notes.append(_note("rotation_ignored", f"the rotations of {one.joint} are not asked, its places are"))
+                message = f"the rotations of {one.joint} are not asked, its places are"
+                notes.append({"code": "rotation_ignored", "severity": "info", "message": message})
         elif one.type == "pose_keyframe":
             pose = _pose(one, rig, size, clock)
             if pose.placed:
@@ -83,10 +84,6 @@ def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Aske
         else:
             ground += [(x / size, z / size, y / size) for x, z, y in one.points]
     return Asked(goal, tuple(floating), np.array(ground) if ground else None, tuple(notes))
-
-
-def _note(code: str, message: str) -> dict[str, str]:
-    return {"code": code, "severity": "info", "message": message}
 
 
 def _path(one: Any, size: float, clock: Clock) -> Goal:

@@ -13,7 +13,6 @@ from motionmcp.schemas import GenerateRequest, Skeleton
 from motionloom.requests.sampling import Sampling
 from motionloom.requests.shared import LONGEST
 from motionloom.server.job_request import JobRequest
-from motionloom.server.jobs import Job
 from motionloom.server.mmcp.rigs import canonical
 from motionloom.server.refusal import Refusal
 from motionloom.server.worker import Worker
@@ -78,7 +77,7 @@ class MotionloomBackbone(Backbone):
             code = "rate_limited" if refusal.status == 429 else "resource_exhausted"
             raise ProtocolError(code, refusal.sentence) from None
         try:
-            await ended(job)
+            await job.ended()
         except asyncio.CancelledError:
             self.worker.cancel(job)
             raise
@@ -97,22 +96,6 @@ class MotionloomBackbone(Backbone):
             canonical_to_request=made.names or None,
             notes=made.notes,
         )
-
-
-async def ended(job: Job) -> None:
-    """Wait until a job has ended."""
-    loop, woken = asyncio.get_running_loop(), asyncio.Event()
-
-    def wake() -> None:
-        loop.call_soon_threadsafe(woken.set)
-
-    stop = job.listen(wake)
-    try:
-        while not job.finished:
-            await woken.wait()
-            woken.clear()
-    finally:
-        stop()
 
 
 def application(worker: Worker) -> Any:

@@ -16,10 +16,8 @@ from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import Timeline
 from motionloom.kinematics.feet import planted_feet
 from motionloom.motion import Motion
-from motionloom.requests.compose import Compose
-from motionloom.requests.edit import Edit
-from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import Sampling
+from motionloom.requests.tasks import Compose, Edit, Generate
 from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
 from motionloom.server.mmcp.rigs import Rig, read_rig
 from motionloom.tasks.run import Models, Plan, run, run_each
@@ -61,7 +59,9 @@ def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]
     rig = read_rig([joint.model_dump() for joint in request.skeleton.joints])
     clock = Clock(request.total_frames, request.fps(FPS))
     asked = read_constraints(request.constraints, rig, clock)
-    seed, count = _seed(request), request.options.num_samples if request.options else 1
+    options = request.options
+    seed, count = (options.seed, options.num_samples) if options else (None, 1)
+    seed = secrets.randbelow(2**31) if seed is None else abs(seed) % 2**61
     motions = []
     for number in range(count):
         drawn = _sample(models, request, rig, clock, asked, seed + number)
@@ -73,20 +73,15 @@ def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]
         np.stack([rig.rotations_of(motion) for motion in motions]),
         np.stack([motion.root for motion in motions]),
         np.stack(free) if len(free) == count else None,
-        [_boundaries(request)] * count,
+        [_request_ends(request)[:-1]] * count,
         {} if rig.uniform else rig.joints(),
         list(asked.notes),
     )
 
 
-def _seed(request: Any) -> int:
-    given = request.options.seed if request.options else None
-    return secrets.randbelow(2**31) if given is None else abs(given) % 2**61
-
-
-def _boundaries(request: Any) -> list[int]:
-    ends = np.cumsum([segment.duration_frames for segment in request.segments])
-    return [int(end) for end in ends[:-1]]
+def _request_ends(request: Any) -> list[int]:
+    """The request's frames at which its segments end."""
+    return np.cumsum([segment.duration_frames for segment in request.segments], dtype=int).tolist()
 
 
 @dataclass(frozen=True)
@@ -125,7 +120,8 @@ def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, 
         )
     if "motion_reference" in kinds:
         motion = _like(sampler, request, rig, clock, seed)
-        motion = _bent(motion, asked)
+        goal = _posed(asked.goal, asked, motion)
+        motion = motion if goal.empty else fit(motion, goal)
     else:
         segments = _segments(request, clock)
         motion = _generated(sampler, segments, asked, seed)
@@ -162,8 +158,7 @@ def _segments(request: Any, clock: Clock) -> list[Segment]:
 
 
 def _ends(request: Any, clock: Clock) -> list[int]:
-    ends = np.cumsum([segment.duration_frames for segment in request.segments])
-    return [*(clock.frame(int(end)) for end in ends[:-1]), clock.sampled_frames]
+    return [*map(clock.frame, _request_ends(request)[:-1]), clock.sampled_frames]
 
 
 def _generated(sampler: _Sampler, segments: list[Segment], asked: Asked, seed: int) -> Motion:
@@ -185,12 +180,6 @@ def _steered(sampler: _Sampler, segments: list[Segment], goal: Goal, seed: int) 
     if goal.mask[:, 0, [0, 2]].all(axis=-1).any():
         return sampler.compose(segments, seed, whole_path(goal))
     return fit(sampler.compose(segments, seed), goal)
-
-
-def _bent(motion: Motion, asked: Asked) -> Motion:
-    """A motion that is drawn already, fitted to what is asked."""
-    goal = _posed(asked.goal, asked, motion)
-    return motion if goal.empty else fit(motion, goal)
 
 
 def _posed(goal: Goal, asked: Asked, motion: Motion) -> Goal:

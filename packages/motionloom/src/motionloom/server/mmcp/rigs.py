@@ -53,7 +53,8 @@ class Rig:
 
     def motion(self, names: Sequence[str], turns: Array, root: Array, fps: float) -> Motion:
         """Poses (frames, joints, 4) as MMCP has them of some joints, the others at rest; root (frames, 3)."""
-        local = np.tile(self._local_rest(), (len(turns), 1, 1))
+        rest = rot.multiply(rot.inverse(self._parents), self.rest)
+        local = np.tile(rest, (len(turns), 1, 1))
         for number, name in enumerate(names):
             local[:, self.skeleton.index(name)] = rot.normalize(np.roll(turns[:, number], 1, axis=-1))
         own = rot.multiply(rot.multiply(self._parents[None], local), rot.inverse(self.rest)[None])
@@ -86,9 +87,6 @@ class Rig:
     def _parents(self) -> Array:
         """(joints, 4) rest rotations of the joints' parents."""
         return np.array([self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents])
-
-    def _local_rest(self) -> Array:
-        return rot.multiply(rot.inverse(self._parents), self.rest)
 
 
 def read_rig(joints: Sequence[Mapping[str, Any]]) -> Rig:
