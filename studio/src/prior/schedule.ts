@@ -29,9 +29,9 @@ export function levels(top: number, steps: number): number[] {
   return [...result, 0];
 }
 
-/** Guidance at a level: what it adds to 1 is `late` times as much below a quarter of all levels, as much above half. */
+/** Guidance at a level: what it adds to 1 is `late` times as much below a tenth of all levels, as much above three. */
 export function guidanceAt(level: number, steps: number, scale: number, late: number): number {
-  const share = Math.min(Math.max(2 - (4 * level) / steps, 0), 1);
+  const share = Math.min(Math.max(1.5 - (5 * level) / steps, 0), 1);
   return scale + Math.max(scale - 1, 0) * (late - 1) * share;
 }
 

@@ -66,11 +66,11 @@ def test_a_scale_may_depend_on_the_level():
 
 @pytest.mark.parametrize(
     ("scale", "expected"),
-    [(2.5, [4.75, 4.75, 3.625, 2.5, 2.5]), (1.0, [1.0] * 5), (0.0, [0.0] * 5), (-2.0, [-2.0] * 5)],
+    [(2.5, [5.5, 5.5, 4.0, 2.5, 2.5]), (1.0, [1.0] * 5), (0.0, [0.0] * 5), (-2.0, [-2.0] * 5)],
 )
-def test_guidance_rises_below_half_of_the_levels(scale, expected):
-    at = rising(scale, 1000, 2.5)
-    np.testing.assert_allclose([at(level) for level in (0, 250, 375, 500, 999)], expected)
+def test_guidance_rises_below_three_tenths_of_the_levels(scale, expected):
+    at = rising(scale, 1000, 3.0)
+    np.testing.assert_allclose([at(level) for level in (0, 100, 200, 300, 999)], expected)
 
 
 def test_a_row_gets_its_own_answer_whatever_the_scales_of_the_others():

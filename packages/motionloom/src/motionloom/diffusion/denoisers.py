@@ -77,15 +77,15 @@ def guide(
 
 
 def rising(scale: float, levels: int, factor: float) -> Callable[[int], float]:
-    """A guidance scale by level: what it adds to 1 is ``factor`` times as much below a quarter of the ``levels``.
+    """A guidance scale by level: what it adds to 1 is ``factor`` times as much below a tenth of the ``levels``.
 
-    Above half of them it is ``scale``, in between it is interpolated; scales up to 1 stay as they are. What the motion
+    Above three tenths it is ``scale``, in between it is interpolated; scales up to 1 stay as they are. What the motion
     is has been decided before; how lively its details are has not (growing scales: Wang et al. 2024, *Analysis of
     Classifier-Free Guidance Weight Schedulers*).
     """
 
     def at(level: int) -> float:
-        late = min(max(2 - 4 * level / levels, 0.0), 1.0)
+        late = min(max(1.5 - 5 * level / levels, 0.0), 1.0)
         return scale + max(scale - 1, 0.0) * (factor - 1) * late
 
     return at

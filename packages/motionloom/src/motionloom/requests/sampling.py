@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from motionloom.diffusion import Schedule
 
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
-LATE_GUIDANCE = 2.5
+LATE_GUIDANCE = 3.0
 """How motions are sampled unless the request differs (docs/decisions/0008); the last is the factor of `rising`."""
 BATCH = 8
 """Rows in one network call."""
