@@ -86,7 +86,8 @@ def sample(arrays, about, text, frames, random):
         state = np.pad(x, ((0, count * patch - frames), (0, 0))).reshape(1, count, -1).repeat(2, axis=0)
         [clean] = net.run(None, fixed | {"state": state, "level": np.full(2, t)})
         with_words, without = clean.reshape(2, count * patch, -1)[:, :frames]
-        guided = without + GUIDANCE * (with_words - without)
+        late = np.clip(1.5 - 5 * t / top, 0, 1)  # guidance rises where little noise is left
+        guided = without + (1 + (GUIDANCE - 1) * (1 + 2 * late)) * (with_words - without)
         left = signal[t] * noise[s] / (signal[s] * noise[t])  # how much of the noise stays
         kept = noise[s] * left / noise[t]
         mean = (signal[s] - kept * signal[t]) * guided + kept * x

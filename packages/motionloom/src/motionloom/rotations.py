@@ -146,7 +146,7 @@ def shortest_arc(a: np.ndarray, b: np.ndarray) -> Array:
     a, b = np.broadcast_arrays(a, b)
     w = 1.0 + (a * b).sum(-1, keepdims=True)
     q = np.concatenate([w, cross(a, b)], axis=-1)
-    opposite = w[..., 0] < 1e-8
+    opposite = w[..., 0] < 1e-12
     if opposite.any():
         other = np.where(np.abs(a[..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
         q = np.where(opposite[..., None], np.concatenate([0 * w, cross(a, other)], axis=-1), q)
