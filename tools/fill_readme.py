@@ -56,7 +56,7 @@ def parse_weights(text: str) -> dict[str, str]:
 
 
 def places(text: str) -> dict[str, str]:
-    """What stands in each place that is filled from a file, by that file."""
+    """What is in each place that is filled from a file, by that file."""
     return {found[2]: found[5].strip() for found in PLACE.finditer(text) if found[1] == "filled from"}
 
 

@@ -9,7 +9,7 @@ constraints-cuda.txt     CUDA's own libraries, which only a CUDA build of torch 
 constraints-robots.txt   what the extra `robots` needs beside constraints.txt
 
 PyTorch also ships builds outside of the index (``2.13.0+cpu``), with other hashes. Those that this machine's pip would
-take are added, and those that stand in the file for the same version stay.
+take are added, and those in the file for the same version stay.
 """
 
 import argparse

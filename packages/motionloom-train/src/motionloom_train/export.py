@@ -1,7 +1,7 @@
 """Networks as ONNX graphs without weights, which `motionloom.runtime` runs with those of the file they lie in.
 
 A graph is what a module does, traced: its initialisers have the names that the weights have in a weight file, and hold
-nothing. What depends on the condition alone is left to the runtime, which computes it once; what stands in the loop is
+nothing. What depends on the condition alone is left to the runtime, which computes it once; what is in the loop is
 in the graph.
 """
 
@@ -32,7 +32,7 @@ from motionloom_train.nets.text.bert import Bert
 
 OPSET = 20
 SMALL = 65536
-"""Bytes of a constant that may stand in a graph."""
+"""Bytes of a constant that a graph may contain."""
 
 
 class PriorGraph(nn.Module):

@@ -171,7 +171,7 @@ def _other_side(name: str, names: Collection[str]) -> str | None:
 
 
 def _swaps(name: str, old: str, new: str) -> list[str]:
-    """The name with one ``old`` replaced, for each place where it stands: ``upper_leg_l`` has two ``_l``."""
+    """The name with one ``old`` replaced, for each place where it occurs: ``upper_leg_l`` has two ``_l``."""
     at = [i for i in range(len(name)) if name.startswith(old, i)]
     return [name[:i] + new + name[i + len(old) :] for i in at]
 

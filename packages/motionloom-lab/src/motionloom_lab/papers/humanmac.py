@@ -1,6 +1,6 @@
 """HumanMAC as published (Chen et al. 2023, algorithm 2; LinghaoChan/HumanMAC): DCT-Completion, its masks, its coins.
 
-What we do better stands in `tasks.completion`; this is the yardstick, faults of the published sampler included:
+What we do better is in `tasks.completion`; this is the yardstick, faults of the published sampler included:
 
 * It stops where the published count of levels has its 0, which is level 1 here: some noise is left.
 * Observed frames are mixed in after every step, low-passed, and not restored at the end.
@@ -193,7 +193,7 @@ def _approached(target: SwitchTarget, rows: int, walk: Sequence[int], basis: Bas
 
 
 def conditioned_samples(count: int, share: float, *, coin: int | None = None) -> list[bool]:
-    """Which of ``count`` samples are told the observation: the first round(share * count).
+    """Which of ``count`` samples know the observation: the first round(share * count).
 
     With ``coin`` (a seed) one coin per sample, as published, where a sample is one call for all windows.
     """

@@ -192,7 +192,7 @@ def can_hold(positions: Array, fps: float, *, end: bool, fastest: float = 0.45) 
 def with_pauses(positions: Array, before: int, after: int, *, fps: float, seed: int, idle: Idle = NO_IDLE) -> Array:
     """What was before and after a stretch (frames, 22, 3): ``before`` and ``after`` more frames of somebody alive.
 
-    Where an end stands as people in ``idle`` do, one of those recordings leads to it or goes on from it. Any other pose
+    Where an end stands as people in ``idle`` do, one of those recordings ends in it or goes on from it. Any other pose
     is held, swaying as a recorded person does, or, with nothing recorded, by about a centimetre at the head and hardly
     at the feet (Winter 1995, quiet stance). The speed at the ends runs out within a third of a second.
     """

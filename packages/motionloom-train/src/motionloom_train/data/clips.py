@@ -35,7 +35,7 @@ class Note:
     kind: str
     """``human``, ``index``, ``action:`` and a name of `data.actions`, or the measured label."""
     texts: tuple[str, ...] = ()
-    """Sentences or verb phrases; empty for measured labels, whose wordings stand in `data.words`."""
+    """Sentences or verb phrases; empty for measured labels, whose wordings are in `data.words`."""
     core: tuple[int, int] | None = None
     """Frames (first, end) of the clip that a training window must hold whole; None: any part shows what is said."""
 

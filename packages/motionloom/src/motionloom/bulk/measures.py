@@ -83,7 +83,7 @@ class Filter:
     """
 
     def __init__(self, text: str) -> None:
-        """Raises `MotionloomError` for whatever else stands in the text; nothing of it is ever executed."""
+        """Raises `MotionloomError` for whatever else the text contains; nothing of it is ever executed."""
         self.text = text
         if len(text) > 1000:
             raise MotionloomError(f"the filter has {len(text):,} characters; say it in at most 1,000")

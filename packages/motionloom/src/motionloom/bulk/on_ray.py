@@ -73,7 +73,7 @@ def on_ray(
         yield item
     else:
         return  # nothing is left to make, and no cluster needed
-    with redirect_stdout(sys.stderr):  # results go there, and Ray says there who died, whatever it is told
+    with redirect_stdout(sys.stderr):  # results go there, and Ray says there who died, whatever its settings
         ray = _start(address)
         try:
             yield from _Crew(ray, items, batch, workers, moved).run()

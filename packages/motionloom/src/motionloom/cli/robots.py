@@ -159,7 +159,7 @@ def read_robot_target(arguments: Namespace) -> RobotTarget:
 
 
 def opened(arguments: Namespace) -> "Robot":
-    """The robot of the line, what its file lacks told."""
+    """The robot of the line; what its file lacks is printed."""
     from motionloom.robots.body import read_robot
 
     robot = read_robot(arguments.robot, arguments.robot_map)

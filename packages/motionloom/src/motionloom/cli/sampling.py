@@ -223,7 +223,7 @@ class Finished(Generic[Made]):
     sampling: float = 0.0
     """Seconds of drawing."""
     happened: list[list[dict[str, Any] | None]] = field(default_factory=list)
-    """What each person of each one did (`motionloom.kinematics.deeds`), where that is told."""
+    """What each person of each one did (`motionloom.kinematics.deeds`), where that is printed."""
     _files: dict[Path, None] = field(default_factory=dict)
     _shown: list[Made] = field(default_factory=list)
 

@@ -19,7 +19,7 @@ BEYOND = 30
 def carried(shift: Array, standing: Flags) -> Array:
     """(frames, 3) metres that a foot goes when the body goes by ``shift``: through every stance by the mean of it.
 
-    standing: (frames,) flags. Between stances it goes with the body and what leads from one to the other.
+    standing: (frames,) flags. Between stances it goes with the body and a curve from one to the other.
     """
     extra = np.zeros_like(shift)
     for start, stop in zip(*_ends(standing), strict=True):

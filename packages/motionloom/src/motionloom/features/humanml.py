@@ -252,7 +252,7 @@ def displacements(features: Numbers) -> Numbers:
 def positions_from_rot6d(features: Numbers, offsets: np.ndarray = OFFSETS) -> Numbers:
     """The other decoder: (..., frames, 22, 3) metres by forward kinematics of the rotations on constant bones.
 
-    As published, the heading quaternion itself (world into heading, not its inverse) stands at the head of every chain.
+    As published, the heading quaternion itself (world into heading, not its inverse) is at the head of every chain.
     """
     _check_width(features)
     xp, lead = namespace(features), features.shape[:-1]

@@ -110,7 +110,7 @@ class GrowingBvh:
         _put(self.file, f"{self.frames:>{self.places}}".encode())
 
     def _block(self, motion: Motion) -> Array:
-        """(rows, channels): the numbers of some frames as they stand in the file."""
+        """(rows, channels): the numbers of some frames as they are in the file."""
         degrees = {name: angles.degrees(motion.rotations) for name, angles in self.angles.items()}
         columns: list[Array] = []
         for joint in self.turning:

@@ -28,7 +28,7 @@ from motionloom.retarget import joints22
 RATE = 20.0
 """Frames per second that are looked at, as the counts were made for."""
 LONGEST = 1200.0
-"""Seconds; of what is longer nothing is told."""
+"""Seconds; what is longer is not described."""
 RUNS, GOES, TURNS = 2.2, 0.6, 15.0
 """m/s from which on somebody runs, metres that count as a way, degrees that count as a turn."""
 LOW, LYING = 0.75, np.radians(55)

@@ -1,6 +1,6 @@
 """What a client asks of a job: untrusted JSON to a `JobRequest`, or a sentence that says what is wrong with it.
 
-What a task may be asked stands in `motionloom.requests`, bounded once more by `Limits`; timelines and goals go through
+What a request may contain is in `motionloom.requests`, bounded once more by `Limits`; timelines and goals go through
 the readers of the command line, so that the same words are refused with the same sentences.
 """
 

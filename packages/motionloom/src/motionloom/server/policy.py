@@ -17,7 +17,7 @@ def _hashed(text: str) -> str:
 CONTENT = {
     "default-src": "'none'",
     "script-src": "'self' 'wasm-unsafe-eval'",  # the decoders of packed characters are WebAssembly of the page's own
-    "style-src": f"'self' {_hashed(STYLE)}",  # that of /docs stands in the page
+    "style-src": f"'self' {_hashed(STYLE)}",  # that of /docs is in the page
     "img-src": "'self' blob: data:",
     "media-src": "'self' blob:",
     "font-src": "'self'",

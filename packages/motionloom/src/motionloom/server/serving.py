@@ -93,7 +93,7 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
 
 
 def read_robots(models: Sequence[Path]) -> "dict[str, Robot]":
-    """Robots by the names of their files; what a model lacks is told."""
+    """Robots by the names of their files; what a model lacks is reported."""
     if not models:
         return {}
     from motionloom.robots.body import read_robot

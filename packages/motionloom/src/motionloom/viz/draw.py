@@ -35,7 +35,7 @@ class Camera:
     """A pinhole camera that looks at a point from an azimuth and an elevation."""
 
     target: Array
-    """(3,) metres: what stands in the middle of the picture."""
+    """(3,) metres: what is in the middle of the picture."""
     size: tuple[int, int]
     """Picture in pixels, before smoothing."""
     span: float

@@ -1,7 +1,7 @@
 """Motions as one page of HTML that plays them: the studio's viewer (`studio/src/viewer`) with the motions in it.
 
 The page loads nothing from anywhere, and nothing in it that comes from outside is markup or code: names and numbers
-stand in it as JSON, of which every character that HTML knows is written as an escape.
+are in it as JSON, of which every character that HTML knows is written as an escape.
 """
 
 import base64
