@@ -1,6 +1,6 @@
 /** Places of 22 joints to a person with constant bones and true turns (`motionloom.kinematics.ik`). */
 
-import { aim, solveLimbs } from "./limbs";
+import { aim, solveLimbs, withKneesAhead } from "./limbs";
 import {
   type Body,
   HEAD,
@@ -43,7 +43,8 @@ const TOLERANCE = 0.12;
 const SAYS = [1, 1, 1, 1, 2, 0, 0, 2, 2];
 
 /** The person who takes the given places, frame by frame, as well as constant bones can. */
-export function bodyOf(seen: Vec[][], fps: number): Body {
+export function bodyOf(sampled: Vec[][], fps: number): Body {
+  const seen = withKneesAhead(sampled);
   const places: Vec[][] = seen.map((frame) => frame.map(() => [0, 0, 0] as const));
   const world: Turn[][] = seen.map((frame) => frame.map(() => IDENTITY));
   solveTrunk(seen, places, world);

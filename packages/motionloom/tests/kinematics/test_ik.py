@@ -94,6 +94,26 @@ def test_a_straight_leg_turns_with_its_foot(degrees: float) -> None:
     np.testing.assert_allclose(np.degrees(np.arctan2(-left[:, 2], left[:, 0])), degrees, atol=8)
 
 
+def test_a_knee_that_bends_the_wrong_way_bends_the_right_way() -> None:
+    """The left leg swings from 40 degrees forwards to 40 degrees backwards; ankles, other joints and evenness stay."""
+    bends = np.radians(np.linspace(40, -40, 40))
+    turns = np.tile(rot.IDENTITY, (40, 22, 1))
+    for joint, share in ((LIMBS[0].start, -0.5), (LIMBS[0].middle, 1.0)):
+        turns[:, joint] = rot.rotvec_to_quat(share * bends[:, None] * [1, 0, 0])
+    seen = Motion(SMPL22, FPS, np.zeros((40, 3)), turns).positions()
+    hip, knee, ankle = LIMBS[0].start, LIMBS[0].middle, LIMBS[0].end
+    made = motion_from_positions(seen, FPS).positions()
+
+    def ahead(places: np.ndarray) -> np.ndarray:
+        return places[:, knee, 2] - (places[:, hip, 2] + places[:, ankle, 2]) / 2
+
+    assert ahead(seen)[-1] < -0.05
+    np.testing.assert_allclose(ahead(made), np.abs(ahead(seen)), atol=0.02)
+    others = [joint for joint in range(22) if joint != knee and joint != LIMBS[0].tip]
+    np.testing.assert_allclose(made[:, others], seen[:, others], atol=0.02)
+    assert bone_speeds(made).max() < 1.5 * bone_speeds(seen).max()
+
+
 def test_a_knee_seen_bent_backwards_by_noise_keeps_its_axis() -> None:
     positions = np.tile(SMPL22.rest_positions(), (40, 1, 1))
     positions[:, 4, 2] += 0.01 * np.sin(np.arange(40) * 2.5)

@@ -55,6 +55,8 @@ _STIFFNESS = 1.0
 _NEARLY_STRAIGHT = (0.95, 0.995)
 """Shares of full reach between which the observed bend takes over from the observed distance."""
 
+_ASIDE = 0.01
+"""Square metres: the product of leg and hips below which the leg lies along the line of the hips and has no front."""
 _TOLERANCE = 0.12
 """Relative error of sampled lengths at which a rotation counts as much as its change from frame to frame."""
 
@@ -72,6 +74,7 @@ def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
         raise MotionloomError(f"positions must be (frames, 22, 3) with at least one frame; got {positions.shape}")
     if not np.isfinite(positions).all():
         raise MotionloomError("the positions have numbers that are not finite (NaN or infinity)")
+    positions = _with_knees_ahead(positions)
     places = np.zeros_like(positions)
     world = np.tile(rot.IDENTITY, (len(positions), 22, 1))
     _solve_trunk(positions, places, world)
@@ -79,6 +82,23 @@ def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
     for ankle, toe in ((7, 10), (8, 11)):
         places[:, toe] = places[:, ankle] + rot.rotate(world[:, ankle], _REST[toe])
     return Motion(SMPL22, fps, places[:, 0], _smooth_limbs(positions, local_rotations(world)))
+
+
+def _with_knees_ahead(positions: Array) -> Array:
+    """The places, knees that bend the wrong way mirrored at the plane through hip, ankle and the line of the hips.
+
+    A person's knees lie in front of that plane, whatever the hips do (recorded ones are more than 1 cm behind it in one
+    frame of 2,400); a knee that comes to it from behind is in it, so mirrored motion is continuous.
+    """
+    result, hips = positions.copy(), positions[:, 1] - positions[:, 2]
+    for limb in LIMBS[:2]:
+        leg = positions[:, limb.end] - positions[:, limb.start]
+        ahead = np.cross(leg, hips)
+        length = np.linalg.norm(ahead, axis=-1, keepdims=True)
+        ahead = np.where(length > _ASIDE, ahead / length.clip(1e-9), 0)
+        depth = ((positions[:, limb.middle] - positions[:, limb.start]) * ahead).sum(-1, keepdims=True)
+        result[:, limb.middle] -= 2 * np.minimum(depth, 0) * ahead
+    return result
 
 
 def local_rotations(world: np.ndarray) -> Array:
