@@ -36,7 +36,7 @@ BUDGETS = {
     "live": 2_959,
     "blender/(top)": 2_786,
     "robots": 2_708,
-    "kinematics": 2_593,
+    "kinematics": 2_595,
     "viz": 2_347,
     "edits": 2_120,
     "runtime": 2_003,

@@ -28,8 +28,8 @@ import {
 const BENT = [Math.sin((6 * Math.PI) / 180), Math.sin((25 * Math.PI) / 180)] as const;
 const NEARLY_STRAIGHT = [0.95, 0.995] as const;
 
-/** Square metres: below it the leg lies along the line of the hips and has no front. */
-const ASIDE = 0.01;
+/** Square metres: the product of leg and hips below which a leg along the line of the hips has no front, and has one. */
+const ASIDE = [0.01, 0.03] as const;
 
 /** The places, knees that bend the wrong way mirrored at the plane through hip, ankle and the line of the hips. */
 export function withKneesAhead(seen: readonly Vec[][]): Vec[][] {
@@ -38,9 +38,8 @@ export function withKneesAhead(seen: readonly Vec[][]): Vec[][] {
     const hips = minus(at[LIMBS[0]!.start]!, at[LIMBS[1]!.start]!);
     for (const { start, middle, end } of LIMBS.slice(0, 2)) {
       const front = cross(minus(at[end]!, at[start]!), hips);
-      if (norm(front) <= ASIDE) continue;
       const depth = dot(minus(at[middle]!, at[start]!), unit(front));
-      result[middle] = add(at[middle]!, unit(front), -2 * Math.min(depth, 0));
+      result[middle] = add(at[middle]!, unit(front), -2 * between(norm(front), ASIDE) * Math.min(depth, 0));
     }
     return result;
   });

@@ -53,7 +53,7 @@ def check_looped(loop: Motion, plain: Motion, blend: int) -> None:
     np.testing.assert_array_equal(loop.root[:-blend], plain.root[:-blend])
 
     def apart(a: np.ndarray, b: np.ndarray) -> float:
-        return float(2 * np.arccos(np.clip(np.abs((a * b).sum(-1)), 0, 1)).max())
+        return float(2 * np.arccos(np.clip(np.abs((a * b).sum(-1)), 0, 1)).mean())
 
     seam, open_seam = (apart(motion.rotations[-1, 1:], motion.rotations[0, 1:]) for motion in (loop, plain))
     assert seam < 0.7 * open_seam

@@ -55,8 +55,8 @@ _STIFFNESS = 1.0
 _NEARLY_STRAIGHT = (0.95, 0.995)
 """Shares of full reach between which the observed bend takes over from the observed distance."""
 
-_ASIDE = 0.01
-"""Square metres: the product of leg and hips below which the leg lies along the line of the hips and has no front."""
+_ASIDE = (0.01, 0.03)
+"""Square metres: the product of leg and hips below which a leg along the line of the hips has no front, and has one."""
 _TOLERANCE = 0.12
 """Relative error of sampled lengths at which a rotation counts as much as its change from frame to frame."""
 
@@ -95,9 +95,9 @@ def _with_knees_ahead(positions: Array) -> Array:
         leg = positions[:, limb.end] - positions[:, limb.start]
         ahead = np.cross(leg, hips)
         length = np.linalg.norm(ahead, axis=-1, keepdims=True)
-        ahead = np.where(length > _ASIDE, ahead / length.clip(1e-9), 0)
+        ahead = ahead / length.clip(1e-9)
         depth = ((positions[:, limb.middle] - positions[:, limb.start]) * ahead).sum(-1, keepdims=True)
-        result[:, limb.middle] -= 2 * np.minimum(depth, 0) * ahead
+        result[:, limb.middle] -= 2 * _between(length, _ASIDE) * np.minimum(depth, 0) * ahead
     return result
 
 
