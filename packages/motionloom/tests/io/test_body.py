@@ -6,6 +6,7 @@ from motionloom import rotations as rot
 from motionloom.io.body import body
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
+from motionloom.viz.figure import figure
 from tests.io.gltf_files import person
 
 
@@ -33,3 +34,20 @@ def test_soles_stand_on_the_floor_and_not_in_it() -> None:
             heights = (piece.points + rest[piece.joint])[:, 1]
             assert abs(heights.min()) < 1e-3
             assert (heights < 1e-3).sum() > 8  # a sole, and no ridge
+
+
+def test_an_arm_taken_for_a_leg_leaves_a_body() -> None:
+    """Which limbs are legs is measured: a leg held up all the time is an arm, and an arm that hangs far down a leg."""
+    motion = Motion(SMPL22, 20.0, np.zeros((12, 3)), np.tile(rot.IDENTITY, (12, 22, 1)))
+    turns = {
+        "right_hip": (-2.6, 1.9, 1.1),
+        "left_hip": (0.0, 0.6, -1.1),
+        "right_shoulder": (0.6, 1.9, -1.4),
+        "left_shoulder": (3.2, -0.5, 1.0),
+        "spine1": (-1.0, 0.5, -1.5),
+    }
+    for joint, turn in turns.items():
+        motion.rotations[:, SMPL22.index(joint)] = rot.rotvec_to_quat(np.array(turn))
+    shape = figure(motion)
+    assert {shape.sides[joint] for joint in shape.hips} == {0, 1}  # none of the right
+    assert all(np.isfinite(piece.points).all() for piece in body(motion))

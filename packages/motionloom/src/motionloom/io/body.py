@@ -129,8 +129,9 @@ def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) ->
 def _between(shape: Figure, world: Array) -> Piece | None:
     """The belly, carried by the pelvis."""
     tip = _local_to(shape, world, shape.centre, shape.places[:, shape.chest[-1]])
-    a, b = (shape.places[:, next(j for j in shape.hips if shape.sides[j] == s)] for s in (1, -1))
-    across = _local(world, shape.centre, a - b)
+    middle = shape.places[:, shape.centre]  # for a leg that is no leg: poses decide which limbs are
+    hips = {shape.sides[j]: shape.places[:, j] for j in reversed(shape.hips)}
+    across = _local(world, shape.centre, hips.get(1, middle) - hips.get(-1, middle))
     rings = shape.height * np.array([[0.075, 0.055], [0.078, 0.055]])
     return _loft(shape.centre, 0, np.stack([np.zeros(3), tip]), rings, across=across)
 
