@@ -111,7 +111,7 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
     const body = finished(theirs, prior.fps, begin);
     const far = off(flat(placesOf(body)), wanted(`${name}.places`));
     const turned = apart(body, wanted(`${name}.turns`));
-    expect(unlike, `${name}: features, standard deviations`).toBeLessThan(1e-2);
+    expect(unlike, `${name}: features, standard deviations`).toBeLessThan(2e-2);
     expect(sketch, `${name}: metres as predicted`).toBeLessThan(5e-3);
     expect(far, `${name}: metres`).toBeLessThan(1e-3);
     expect(turned, `${name}: degrees`).toBeLessThan(0.1);
@@ -147,8 +147,8 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
     if (!("path of a chain.seen" in said.index)) return;
     const segments = said.chains[0]!.map(([text, seconds]) => ({ text, seconds }));
     const way = prior.way(segments, said.path);
-    const [features] = await prior.features(literal(segments), 4, 1, undefined, way);
-    // steered and guided, rounding grows: one millionth in each estimate moves a joint by a third of a millimetre
+    const [features] = await prior.features(literal(segments), 5, 1, undefined, way);
+    // steered and guided, rounding grows: one millionth in each estimate moves a joint by half a millimetre
     expect(off(sketched(features!, startOf(way)), wanted("path of a chain.seen")), "metres").toBeLessThan(2e-2);
   }, 600_000);
 

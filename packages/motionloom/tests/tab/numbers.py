@@ -157,7 +157,7 @@ def _paths(prior: Prior, found: Numbers) -> None:
     frames = [round(segment.seconds * prior.fps) for segment in segments]
     track = Track.along(root_path(PATH, frames=sum(frames)), prior.fps)
     asked = [track.with_path(part, sum(frames[:n]), frames[n]) for n, part in enumerate(segments)]
-    pieces = long_features(prior, asked, sampling=Sampling(seed=4))
+    pieces = long_features(prior, asked, sampling=Sampling(seed=5))  # with 4, a foot is at the edge of being planted
     places = place_pieces(prior, pieces, deque([None] * len(asked)), track.place(0), track)
     found.add("path of a chain.seen", np.concatenate([piece.positions for piece in places]))
 
