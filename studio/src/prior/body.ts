@@ -73,10 +73,10 @@ function solveTrunk(seen: Vec[][], places: Vec[][], world: Turn[][]): void {
   const wide = (a: number, b: number): Vec => minus(REST[a]!, REST[b]!);
   const shoulders = add(wide(LEFT.shoulder, RIGHT.shoulder), wide(LEFT.collar, RIGHT.collar));
   const hips = fitted(seen, PELVIS, [LEFT.hip, RIGHT.hip, SPINE1], shoulders, bone(LEFT.shoulder, RIGHT.shoulder));
-  setJoint(world, PELVIS, smoothed(hips, errors(bone(LEFT.hip, RIGHT.hip), wide(LEFT.hip, RIGHT.hip))));
+  setJoint(world, PELVIS, smoothed(hips, missing(bone(LEFT.hip, RIGHT.hip), wide(LEFT.hip, RIGHT.hip))));
   const [collars, rest] = [bone(LEFT.collar, RIGHT.collar), wide(LEFT.collar, RIGHT.collar)];
   const chest = fitted(seen, SPINE3, [NECK, LEFT.collar, RIGHT.collar], rest, collars);
-  setJoint(world, SPINE3, smoothed(chest, errors(collars, rest)));
+  setJoint(world, SPINE3, smoothed(chest, missing(collars, rest)));
   for (const [joint, child, share] of [[SPINE1, SPINE2, 1 / 3] as const, [SPINE2, SPINE3, 2 / 3] as const]) {
     const bones = bone(child, joint);
     const lean = Math.min(2, (6 * spread(bones.map(norm))) / LENGTHS[child]!);
@@ -92,7 +92,7 @@ function solveTrunk(seen: Vec[][], places: Vec[][], world: Turn[][]): void {
     [RIGHT.collar, RIGHT.shoulder] as const,
   ]) {
     const sampled = seen.map((at, f) => minus(at[child]!, places[f]![joint]!));
-    const error = errors(sampled, REST[child]!);
+    const error = missing(sampled, REST[child]!);
     const local = world.map((turns, f) => {
       const usual = rotate(turns[SPINE3]!, REST[child]!);
       const turned = aim(turns[SPINE3]!, REST[child]!, add(sampled[f]!, usual, 2 * error[f]!));
@@ -143,24 +143,28 @@ function spread(numbers: readonly number[]): number {
   return Math.sqrt(numbers.reduce((sum, x) => sum + (x - mean) ** 2, 0) / numbers.length);
 }
 
-/** How far the lengths of sampled bones are from their own, in units of that. */
-function errors(bones: readonly Vec[], rest: Vec): number[] {
-  return bones.map((bone) => Math.abs(1 - norm(bone) / norm(rest)));
+/** By how much a sampled bone is shorter than its own, in units of that. */
+function shortness(bone: Vec, length: number): number {
+  return Math.max(1 - norm(bone) / length, 0);
 }
 
-/** Turns smoothed in time as far as what they were read off has the wrong length. */
+function missing(bones: readonly Vec[], rest: Vec): number[] {
+  return bones.map((bone) => shortness(bone, norm(rest)));
+}
+
+/** Turns smoothed in time as far as what they were read off is too short. */
 function smoothed(turns: Turn[], error: readonly number[]): Turn[] {
   const weight = error.map((one) => (TOLERANCE / Math.max(one, 1e-6)) ** 2);
   const right = unroll([...turns]).map((turn, f) => turn.map((x) => weight[f]! * x));
   return tridiagonal(weight, 1, right).map(normalized);
 }
 
-/** Hips, knees, shoulders and elbows smooth where their limb was sampled with the wrong lengths, in place. */
+/** Hips, knees, shoulders and elbows smooth where their limb was sampled too short, in place. */
 function smoothLimbs(seen: readonly Vec[][], turns: Turn[][]): void {
   for (const { start, middle, end } of LIMBS) {
     const error = seen.map((at) => {
-      const [upper, lower] = [norm(minus(at[middle]!, at[start]!)), norm(minus(at[end]!, at[middle]!))];
-      return (Math.abs(1 - upper / LENGTHS[middle]!) + Math.abs(1 - lower / LENGTHS[end]!)) / 2;
+      const upper = shortness(minus(at[middle]!, at[start]!), LENGTHS[middle]!);
+      return (upper + shortness(minus(at[end]!, at[middle]!), LENGTHS[end]!)) / 2;
     });
     for (const joint of [start, middle]) setJoint(turns, joint, smoothed(column(turns, joint), error));
   }

@@ -192,6 +192,27 @@ def test_a_collar_drawn_short_and_aside_for_a_frame_stays() -> None:
     assert spike((16, 18, 20), aside - bone)[20, 13] < 8
 
 
+def waving(forearm: float) -> np.ndarray:
+    """A left hand that waves 2.5 times a second beside the head, of an arm whose forearm is so many times its length."""
+    frames = 60
+    turns = np.tile(rot.IDENTITY, (frames, 22, 1))
+    turns[:, 16] = rot.rotvec_to_quat(np.array([0, 0, -0.3]))
+    swing = 0.5 * np.sin(np.arange(frames) / FPS * 2.5 * 2 * np.pi)
+    turns[:, 18] = rot.rotvec_to_quat((1.6 + swing)[:, None] * [0, 0, 1])
+    positions = Motion(SMPL22, FPS, np.tile([0, 0.9, 0], (frames, 1)), turns).positions()
+    positions[:, 20] = positions[:, 18] + forearm * (positions[:, 20] - positions[:, 18])
+    return positions
+
+
+@pytest.mark.parametrize("forearm", [1.0, 1.25, 1.5])
+def test_an_arm_that_is_sampled_too_long_waves_as_far_as_it_did(forearm: float) -> None:
+    """Networks sample waving forearms up to a half too long."""
+    sampled = waving(forearm)
+    bone = motion_from_positions(sampled, FPS).positions()[:, 20] - sampled[:, 18]
+    sides = np.ptp(bone[10:50, 0]), np.ptp((sampled[:, 20] - sampled[:, 18])[10:50, 0]) / forearm
+    assert 0.85 < sides[0] / sides[1] < 1.3
+
+
 def test_what_is_drawn_wrongly_counts_less_than_how_it_changes() -> None:
     """Against the least squares written out, and whichever sign rotations have."""
     rng = np.random.default_rng(0)
@@ -211,7 +232,7 @@ def test_what_is_drawn_wrongly_counts_less_than_how_it_changes() -> None:
         np.testing.assert_allclose(found * np.sign((found * expected).sum(-1, keepdims=True)), expected, atol=1e-6)
     rest = np.array([0.0, 0.2, 0.0])
     bones = np.outer([0.5, 1.0, 1.5, 0.0], [0.0, 0.0, 0.2])
-    np.testing.assert_allclose(ik._length_error(bones, rest), [0.5, 0, 0.5, 1])
+    np.testing.assert_allclose(ik._length_error(bones, rest), [0.5, 0, 0, 1])  # what is too long shows its direction
 
 
 def test_everything_in_one_point_is_still_a_motion() -> None:

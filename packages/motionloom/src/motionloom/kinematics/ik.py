@@ -161,18 +161,18 @@ def _smooth_bones(bone: Array, expected: Array, child: int) -> Array:
 
 
 def _length_error(bone: Array, rest: Array) -> Array:
-    """(frames,): how far the length of a sampled bone (frames, 3) is from its own, in units of that."""
-    return np.abs(1 - np.linalg.norm(bone, axis=-1) / np.linalg.norm(rest))
+    """(frames, ...): by how much a sampled bone (frames, ..., 3) is shorter than its own, in units of that."""
+    return (1 - np.linalg.norm(bone, axis=-1) / np.linalg.norm(rest, axis=-1)).clip(0)
 
 
 def _smooth_by_confidence(turns: Array, error: Array) -> Array:
-    """Rotations (frames, ..., 4), smoothed in time as far as what they were read off has the wrong length (frames,
-    ...).
+    """Rotations (frames, ..., 4), smoothed in time as far as what they were read off is too short (frames, ...).
 
     Where a network is not sure it samples in between: somebody who spins has both hips, or a limb its two ends, in one
     place, and what is read off that turns by half a circle within a frame. Minimises the squared distance to each
     rotation, weighted by the inverse square of the relative error, plus the squared change per frame: what is sampled
-    with the right lengths stays exactly as it is.
+    long enough stays as it is. A bone that is too long shows its direction well: arms that wave are sampled up to a
+    half too long, and to smooth them for it would halve the wave.
     """
     weight = (_TOLERANCE / error.clip(1e-6))[..., None] ** 2
     return rot.normalize(_tridiagonal(weight, 1.0, weight * rot.unroll(turns)))
@@ -239,9 +239,8 @@ def _smooth_limbs(seen: Array, local: Array) -> Array:
     to fold up, or open, within a frame to reach its end."""
     ends = [[limb.start, limb.middle, limb.end] for limb in LIMBS]
     joints = [[limb.start, limb.middle] for limb in LIMBS]
-    lengths = _LENGTHS[[[limb.middle, limb.end] for limb in LIMBS]]
-    sampled = np.linalg.norm(np.diff(seen[:, ends], axis=2), axis=-1)
-    error = np.abs(1 - sampled / lengths).mean(-1)
+    bones = _REST[[[limb.middle, limb.end] for limb in LIMBS]]
+    error = _length_error(np.diff(seen[:, ends], axis=2), bones).mean(-1)
     result = local.copy()
     result[:, joints] = _smooth_by_confidence(
         local[:, joints], error[..., None]
