@@ -8,11 +8,9 @@ import torch
 
 from motionloom.diffusion import cosine
 from motionloom.features import humanml
-from motionloom.goals.timeline import timeline_of
 from motionloom.kinematics.physics import bone_length_error
 from motionloom.runtime.text.protocol import TextEmbedding
-from motionloom.tasks.long import compose
-from motionloom.tasks.splice import concatenate
+from motionloom.tasks.text import generate, sample_features
 from motionloom.weights.prior import Card, Prior
 from motionloom_lab.suites.harness import generator
 from motionloom_train.modules import prior_session
@@ -57,13 +55,13 @@ def test_finished_motions_have_constant_bones_and_drawn_ones_need_not(prior: Pri
     assert bone_length_error(finished) < 1e-9 < bone_length_error(drawn)
 
 
-def test_actions_that_follow_each_other_are_the_long_motion_that_generate_makes(prior: Prior) -> None:
+def test_what_is_finished_is_what_generate_makes(prior: Prior) -> None:
+    """Actions one after the other, and lengths as they were asked for; the network's own is one motion of the words."""
     prompt = "a person walks forward, then sits down"
-    made, _ = generator(prior, steps=2)(["a", prompt], seconds=4.0, seed=5)
-    segments = timeline_of(prompt, 4.0).segments
-    assert [segment.text for segment in segments] == ["a person walks forward", "a person sits down"]
-    expected = concatenate(*compose(prior, segments, seed=6, steps=2)).positions()
-    assert made[1].shape == (80, 22, 3)
-    np.testing.assert_array_equal(made[1], expected)
-    np.testing.assert_array_equal(generator(prior, steps=2)([prompt], seconds=4.0, seed=6)[0][0], expected)
-    np.testing.assert_allclose(made[0], generator(prior, steps=2)(["a"], seconds=4.0, seed=5)[0][0], atol=1e-5)
+    finished, _ = generator(prior, steps=2, finished=True)(["a", prompt], seconds=4.0, seed=5)
+    expected = generate(prior, ["a", prompt], seconds=4.0, seed=5, steps=2)
+    for positions, motion in zip(finished, expected, strict=True):
+        np.testing.assert_array_equal(positions, motion.positions())
+    own, _ = generator(prior, steps=2)([prompt], seconds=4.0, seed=6)
+    [features] = sample_features(prior, [prompt], [80], seeds=[6], steps=2)
+    np.testing.assert_array_equal(own[0], humanml.decode_positions(features.astype(np.float64)))

@@ -100,6 +100,7 @@ WHOLES = [
     "she stretches after the morning run",
     "he walks through the door that opens and closes",
     "a guard who walks and stops is bored",
+    "somebody takes a run-up and leaps",
     "a person stands next to a wall",
     "she walks slowly before the judges sit down",
     "a man jumps because he won the race and cheers",

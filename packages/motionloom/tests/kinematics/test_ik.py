@@ -193,7 +193,7 @@ def test_a_collar_drawn_short_and_aside_for_a_frame_stays() -> None:
 
 
 def waving(forearm: float) -> np.ndarray:
-    """A left hand that waves 2.5 times a second beside the head, of an arm whose forearm is so many times its length."""
+    """A left hand that waves 2.5 times a second beside the head; the forearm is so many times as long as it is."""
     frames = 60
     turns = np.tile(rot.IDENTITY, (frames, 22, 1))
     turns[:, 16] = rot.rotvec_to_quat(np.array([0, 0, -0.3]))

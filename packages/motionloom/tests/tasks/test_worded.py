@@ -61,8 +61,76 @@ def test_python_reads_numbers_and_can_leave_them(prior: Prior) -> None:
     assert literal.seconds == pytest.approx(5.0)
     (way,) = worded.generate_worded(prior, "a person walks 2 meters, then waves", sampling=few)
     assert [segment.text for segment in way.timeline.segments] == ["a person walks 2 meters", "a person waves"]
-    (whole,) = worded.generate_worded(prior, "a person walks, then waves", sampling=few)
+    two, whole = (
+        worded.generate_worded(prior, "a person walks, then waves", as_one=one, sampling=few)[0]
+        for one in (False, True)
+    )
+    assert [segment.text for segment in two.timeline.segments] == ["a person walks", "a person waves"]
     assert len(whole.timeline.segments) == 1
+
+
+ACTIONS = ["a person waves", "a person walks", "a person jumps"]
+
+
+def attempts_of(prior: Prior, monkeypatch: pytest.MonkeyPatch, shown: dict[int, int], **how) -> tuple[list, list]:
+    """Three actions, each found ``shown`` attempts after the first; what is missing before is one thing less each time.
+
+    The motions, and the seeds of all attempts.
+    """
+    seeds: list[int] = []
+    attempts: dict[str, int] = dict.fromkeys(ACTIONS, 0)
+    each = worded.generate_each
+
+    def sampled(*args, seeds: list[int], **more):
+        seen.extend(seeds)
+        yield from each(*args, seeds=seeds, **more)
+
+    seen = seeds
+
+    def missing(text: str, *_) -> list[str]:
+        attempts[text] += 1
+        return ["a wave"] * max(shown[ACTIONS.index(text)] + 1 - attempts[text], 0)
+
+    monkeypatch.setattr(worded, "generate_each", sampled)
+    monkeypatch.setattr(worded, "missing", missing)
+    motions = worded.generate_worded(prior, ACTIONS, seconds=1.0, steps=2, seed=7, **how)
+    return motions, seeds
+
+
+def test_what_is_not_shown_is_generated_again(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    motions, seeds = attempts_of(prior, monkeypatch, {0: 0, 1: 2, 2: 9})
+    assert len(set(seeds)) == len(seeds) == 3 + 2 + 2 + 1
+    assert seeds[:3] == [7, 8, 9]
+    assert [one.timeline.segments[0].text for one in motions] == ACTIONS
+    assert [bool(one.missing) for one in motions] == [False, False, True]
+    [line] = [one for one in motions[2].shortfalls if "attempts" in one]
+    assert line.startswith("not found in 4 attempts: a wave")
+    (third,) = generate(prior, ACTIONS[1], seconds=1.0, steps=2, seed=seeds[5], as_one=True)
+    np.testing.assert_allclose(motions[1].motion.positions(), third.positions(), atol=1e-5)
+
+
+def test_a_sentence_as_one_keeps_the_first_motion(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, seeds = attempts_of(prior, monkeypatch, {0: 9, 1: 9, 2: 9}, as_one=True)
+    assert seeds == [7, 8, 9]
+
+
+def test_progress_stays_at_its_end_and_may_cancel(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[int, int]] = []
+    attempts_of(prior, monkeypatch, {0: 0, 1: 1, 2: 0}, progress=lambda done, of: calls.append((done, of)))
+    assert calls[:2] == [(1, 2), (2, 2)]
+    assert set(calls[2:]) == {(2, 2)}
+    assert len(calls) == 4
+
+
+def test_actions_one_after_the_other_are_looked_for_in_their_own_time(
+    prior: Prior, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[str, int]] = []
+    monkeypatch.setattr(worded, "missing", lambda text, p, fps: seen.append((text, len(p))) or [])
+    (one,) = worded.generate_worded(prior, "a person walks, then waves", seconds=3.0, steps=2)
+    assert not one.missing
+    begins = one.timeline.begins
+    assert seen[:2] == [("a person walks", begins[1]), ("a person waves", begins[2] - begins[1])]
 
 
 def test_another_solver_draws_one_action(prior: Prior) -> None:

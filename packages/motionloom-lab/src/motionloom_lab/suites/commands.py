@@ -218,9 +218,14 @@ def generator_of(asked: Asked) -> Generate:
     """The prior behind a plain function of prompts, length and seed."""
     from motionloom_lab.suites.harness import generator
 
-    names = ("steps", "guidance", "solver", "finished", "best_of")
+    names = ("steps", "guidance", "solver", "best_of")
     prior = Prior.load(asked["weights"], device=asked["device"])
-    return generator(prior, **{name: asked[name] for name in names if name in asked})
+    return generator(prior, finished=_is_finished(asked), **{name: asked[name] for name in names if name in asked})
+
+
+def _is_finished(asked: Asked) -> bool:
+    """Whether motions are judged as `generate` writes them."""
+    return bool(asked["finished"]) if "finished" in asked else not asked.get("sampled")
 
 
 def run_of(asked: Asked) -> Run:
@@ -231,7 +236,7 @@ def run_of(asked: Asked) -> Run:
 def sampling_of(asked: Asked) -> dict[str, Any]:
     """How motions are sampled, for the file of results."""
     said = {name: asked.get(name) for name in ("weights", "steps", "guidance", "solver")}
-    return {**said, "finished": bool(asked.get("finished"))}
+    return {**said, "finished": _is_finished(asked)}
 
 
 def write_page(asked: Asked, name: str, title: str, said: str, tables: Sequence[Sequence[Sequence[str]]]) -> None:

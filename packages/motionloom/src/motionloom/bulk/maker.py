@@ -263,6 +263,7 @@ class Maker:
         goals = (None, asked.goal) if row.whom else (asked.goal, None)
         said = {
             "prompt": row.prompt,
+            "as_one": (task == "generate" and timeline is None) or None,
             "foot_lock": not options.raw,
             "loop": options.loop is not None,
             "blend": options.loop,

@@ -78,6 +78,7 @@ def run_generate(arguments: Namespace) -> int:
             "seats": [asdict(seat) for seat in taken],
             "stairs": stairs_under(worded[i].motion),
             "amounts": [asdict(one) for one in worded[i].amounts],
+            "missing": worded[i].missing,
             "still_from": worded[i].still_from,
         }
         for i, (caption, taken) in enumerate(zip(captions[: made.count], seated))

@@ -1,80 +1,314 @@
-"""What the words of one action allow to check: where to, which way round, what is done, how low.
+"""What the words of one action allow to check: where to, which way round, what is done, how fast, how low.
 
-Not a judge of motion (`motionloom_lab` has one): the few things that words say plainly and joints show plainly, by
-which one of several candidates is chosen (`motionloom.tasks.best`).
+Not a judge of motion (`motionloom_lab` has one): the few things that words say plainly and joints show plainly. A
+motion that does not show them is sampled again from another seed (`motionloom.tasks.worded`), and of several candidates
+one is selected that shows the most (`motionloom.tasks.best`).
 """
 
 import re
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
 from motionloom.goals.verbs import base_of, kind_of_verb
-from motionloom.kinematics.counts import Counted, Side, count
-from motionloom.kinematics.gestures import hands_height, pelvis_height, wrist_swings
-from motionloom.kinematics.physics import displacement, travel, turn
+from motionloom.kinematics.counts import Side, count
+from motionloom.kinematics.gestures import (
+    foot_lifts,
+    hands_height,
+    leg_length,
+    longest,
+    oscillations,
+    pelvis_height,
+    seats,
+    torso_inclination,
+    wrist_swings,
+)
+from motionloom.kinematics.physics import (
+    ANKLES,
+    WRISTS,
+    Array,
+    J,
+    displacement,
+    floor_height,
+    in_body,
+    smooth,
+    speed,
+    travel,
+    turn,
+)
+from motionloom.motion import heading
 
-Check = Callable[[np.ndarray, float], bool]
+Check = Callable[[Array, float], bool]
 """(positions (frames, 22, 3) metres, frames per second) to whether something is done."""
 _GOES = 0.6
 """Metres that somebody goes who goes anywhere."""
-_TURNS, _TURNS_ROUND = np.radians(25), np.radians(120)
-_LOW = 0.85
-"""Leg lengths of the pelvis over the feet below which somebody crouches, kneels or sits."""
+_BRISK, _SLOW, _RUNS = 1.4, 1.0, 2.0
+"""m/s above which a walk is fast, below which it is slow, that somebody reaches who runs."""
+_TURNS, _TURNS_ROUND, _SPINS = np.radians(25), (np.radians(120), np.radians(240)), np.radians(300)
+_LOW, _DOWN, _UP = 0.85, 0.4, 0.85
+"""Leg lengths of the pelvis over the feet: below it somebody crouches, kneels or sits; over the floor of somebody who
+sits or lies on it; over the feet of somebody who is up."""
+_UPRIGHT, _FLAT = np.radians(50), np.radians(60)
+"""Inclination of the trunk below which somebody is upright, above which somebody lies."""
+_FACES = np.radians(60)
+_GAIT = (
+    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|pace|step)"
+    r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b"
+)
+_BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing)? (?:up|away)|few steps back)\b"
+_IN_PLACE = r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)|up and down)\b"
+_NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
+_FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
+_LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """Something that the words of one action say plainly."""
+
+    name: str
+    """What, for a sentence: "a turn to the left"."""
+    check: Check
+
+
+@dataclass(frozen=True)
+class _Phrase:
+    """The words of one action, in lower case."""
+
+    text: str
+
+    def has(self, *patterns: str) -> bool:
+        """Whether each of some patterns is in it."""
+        return all(re.search(pattern, self.text) for pattern in patterns)
+
+    @property
+    def kinds(self) -> set[str]:
+        """The kinds of its verbs."""
+        words = [word for word in re.findall(r"[a-z]+", self.text) if word != "left"]
+        return {kind_of_verb(word, self.text) for word in words if base_of(word)}
+
+    @property
+    def side(self) -> Side:
+        """The one side that it names."""
+        sides = set(re.findall(r"\b(left|right)\b", self.text))
+        return "" if len(sides) != 1 else "left" if "left" in sides else "right"
 
 
 def share_met(text: str, positions: np.ndarray, fps: float) -> float:
-    """Share of what the words of one action allow to check that a motion does; 1 where they allow nothing."""
-    checks = checks_of(text)
-    return float(np.mean([check(positions, fps) for check in checks])) if checks else 1.0
+    """Share of what the words of one action allow to check that a motion does; 1 where they allow nothing.
+
+    positions (frames, 22, 3) metres, +Y up; fps: frames per second.
+    """
+    expectations = expectations_of(text)
+    return 1 - len(missing(text, positions, fps)) / max(len(expectations), 1)
+
+
+def missing(text: str, positions: np.ndarray, fps: float) -> list[str]:
+    """The names of what the words of one action say plainly and a motion does not show; arguments as of `share_met`."""
+    p = np.asarray(positions, dtype=np.float64)
+    return [one.name for one in expectations_of(text) if not one.check(p, fps)]
 
 
 def asks_for_rest(text: str) -> bool:
     """Whether somebody is to stand, sit, lie or wait."""
-    return "state" in _kinds(text.lower())
+    return "state" in _Phrase(text.lower()).kinds
 
 
-def checks_of(text: str) -> list[Check]:
+def expectations_of(text: str) -> list[Expectation]:
     """What can be checked of the words of one action."""
-    phrase = text.lower()
-    kinds, sides = _kinds(phrase), set(re.findall(r"\b(left|right)\b", phrase))
-    side: Side = "" if len(sides) != 1 else "left" if "left" in sides else "right"
-    sign, hands = 1 if side == "left" else -1, {"": (0, 1), "left": (0,), "right": (1,)}
-    limb = side if re.search(r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b", phrase) else ""
-    checks: list[Check] = [partial(_repeats, what, limb) for what in countable_actions(phrase)]
-    if "turn" in kinds or re.search(r"\bturn", phrase):
-        if side and not limb:
-            checks.append(lambda p, fps: sign * turn(p) > _TURNS)
-        if re.search(r"\b(?:around|round|about|180)\b", phrase):
-            checks.append(lambda p, fps: abs(turn(p)) > _TURNS_ROUND)
-    elif "locomotion" in kinds and not re.search(r"\b(?:in place|on (?:the|one) spot|treadmill)\b", phrase):
-        checks.append(_travels(phrase, side))
-    if re.search(r"\b(?:crouch|kneel|squat|sit down|sits down|sitting down|duck)", phrase):
-        checks.append(lambda p, fps: float(pelvis_height(p).min()) < _LOW)
-    if re.search(r"\b(?:rais|lift)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b", phrase):
-        checks.append(lambda p, fps: bool(hands_height(p, over="neck")[:, hands[side]].max() > 0))
-    if re.search(r"\bwav(?:e|es|ing)\b", phrase):
-        checks.append(lambda p, fps: max(wrist_swings(p, fps)[hand] for hand in hands[limb]) >= 3)
-    return checks
+    phrase = _Phrase(text.lower())
+    limb: Side = phrase.side if phrase.has(_LIMB) else ""
+    way: Side = "" if limb else phrase.side
+    parts = (_repeated(phrase, limb), _ways(phrase, way), _postures(phrase), _arms(phrase, limb), _whole_body(phrase))
+    return [Expectation(name, check) for part in parts for name, check in part]
 
 
-def _kinds(phrase: str) -> set[str]:
-    words = [word for word in re.findall(r"[a-z]+", phrase) if word != "left"]
-    return {kind_of_verb(word, phrase) for word in words if base_of(word)}
+_Named = tuple[str, Check]
 
 
-def _repeats(what: Counted, side: Side, p: np.ndarray, fps: float) -> bool:
-    return count(what, p, fps, side=side) > 0
+def _repeated(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
+    often = phrase.has(r"\b(?:keeps|again and again|over and over|repeatedly|continuous|up and down|in place)\b")
+    for what in sorted(countable_actions(phrase.text)):
+        if what == "squats" and "state" in phrase.kinds:  # stays down
+            continue
+        least = 3 if often else 2 if what in ("claps", "jumping jacks") else 1
+        name = f"{least} {what}" if least > 1 else what
+        yield name, lambda p, fps, what=what, least=least: count(what, p, fps, side=limb) >= least  # type: ignore[misc]
+        if limb and what in ("kicks", "punches"):
+            other: Side = "left" if limb == "right" else "right"
+            yield (
+                f"{what} of the {limb} side alone",
+                lambda p, fps, what=what, other=other: (  # type: ignore[misc]
+                    count(what, p, fps, side=other) == 0
+                ),
+            )
+    if phrase.has(r"\b(?:clap|applau)"):
+        yield "hands that meet", lambda p, fps: float(np.percentile(_between_hands(p), 3)) < 0.25
 
 
-def _travels(phrase: str, side: Side) -> Check:
-    if re.search(r"\b(?:backwards?|in reverse)\b", phrase):
-        return lambda p, fps: displacement(p, fps).forward < -_GOES
-    if side and re.search(r"\b(?:side|strafe)", phrase):
-        sign = 1 if side == "left" else -1
-        return lambda p, fps: sign * displacement(p, fps).left > _GOES
-    if re.search(r"\bforwards?\b", phrase):
-        return lambda p, fps: displacement(p, fps).forward > _GOES
-    return lambda p, fps: travel(p, fps) > _GOES
+def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
+    sign, turns = (1 if side == "left" else -1), phrase.has(r"\b(?:turn|pivot|rotat)") and not phrase.has(_NO_TURN)
+    if phrase.has(_NO_TURN):
+        yield "facing one way", lambda p, fps: abs(turn(p)) < _FACES
+    if phrase.has(r"\b(?:spin|twirl|pirouet)"):
+        yield "a full turn", lambda p, fps: float(np.abs(np.diff(smooth(heading(p), 3))).sum()) > _SPINS
+    elif turns and side and not phrase.has(_LIMB):
+        yield f"a turn to the {side}", lambda p, fps: sign * turn(p) > _TURNS
+    elif turns and phrase.has(r"\b(?:around|round|about|180|other (?:way|direction)|opposite)\b"):
+        yield "a half turn", lambda p, fps: _TURNS_ROUND[0] < abs(turn(p)) < _TURNS_ROUND[1]
+    if phrase.has(_IN_PLACE):
+        yield "staying in place", lambda p, fps: float(np.hypot(*_from_start(p).max(axis=0))) < 2 * _GOES
+    elif phrase.has(r"\b(?:walks? back|walking back|comes? back|returns?)\b") and not phrase.has(_BACKWARDS):
+        yield (
+            "a way back",
+            lambda p, fps: float(np.linalg.norm(p[-1, 0, [0, 2]] - p[0, 0, [0, 2]])) < travel(p, fps) / 2,
+        )
+    elif phrase.has(r"\bstairs?\b|\bstaircase\b|\bladder\b"):
+        falls = phrase.has(r"\bdown|\bdescend")
+        yield ("a way down" if falls else "a way up"), lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > 0.3
+    elif phrase.has(f"{_GAIT}|{_BACKWARDS}") and not turns:
+        yield _direction(phrase, side, sign)
+    yield from _paces(phrase)
+
+
+def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
+    if phrase.has(_BACKWARDS):
+        return "a way backwards", lambda p, fps: displacement(p, fps).forward < -_GOES
+    if side and phrase.has(r"\b(?:side|strafe|shuffl|over to)"):
+        return f"a way to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES
+    if phrase.has(r"\b(?:forwards?|ahead)\b") and not side:
+        return "a way forward", lambda p, fps: displacement(p, fps).forward > _GOES
+    return "a way", lambda p, fps: travel(p, fps) > _GOES
+
+
+def _paces(phrase: _Phrase) -> Iterator[_Named]:
+    walks = phrase.has(r"\b(?:walk|stroll|stride)")
+    runs = phrase.has(r"\b(?:run|runs|running|sprint\w*)\b(?!-up)") and not phrase.has(f"{_BACKWARDS}|{_IN_PLACE}")
+    if runs and not walks:
+        yield "a run", lambda p, fps: float(speed(p, fps).max()) > _RUNS
+    elif walks and phrase.has(r"\b(?:fast|quick|brisk|hurr|rush|swift)"):
+        yield "a fast walk", lambda p, fps: _pace(p, fps) > _BRISK
+    elif walks and phrase.has(r"\bslow(?:ly)?\b|\bleisure"):
+        yield "a slow walk", lambda p, fps: _pace(p, fps) < _SLOW
+    if phrase.has(r"\b(?:stops|halts?|comes to a (?:stop|halt|standstill))\b") and phrase.has(_GAIT):
+        yield "a stop", lambda p, fps: float(speed(p, fps)[-max(1, round(fps / 4)) :].mean()) < 0.3
+
+
+def _postures(phrase: _Phrase) -> Iterator[_Named]:
+    sits = phrase.has(r"\b(?:sit|sits|sitting|sat|takes? a seat|taking a seat)\b")
+    if sits and phrase.has(_FLOOR):
+        yield "sitting on the floor", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & _upright(p), 1.0, fps)
+    elif sits:
+        yield "sitting", lambda p, fps: bool(seats(p, fps, shortest=0.5))
+    elif phrase.has(r"\b(?:chair|seat|bench|stool)\b") and "change" in phrase.kinds:
+        yield "sitting at the start", lambda p, fps: any(one.begin < 1 for one in seats(p, fps, shortest=0.25))
+    if phrase.has(r"\b(?:lie|lies|lying|lays?|laying)\b") and not phrase.has(
+        r"\b(?:gets?|stands?|rises?) (?:back )?up"
+    ):
+        yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > _FLAT), 0.5, fps)
+    if phrase.has(r"\b(?:crouch|kneel|squat|duck)"):
+        yield "going low", lambda p, fps: float(pelvis_height(p).min()) < _LOW
+    if phrase.has(
+        r"\b(?:gets?|getting|stands?|standing|rises?) (?:back )?(?:up\b|on(?:to)? (?:the|his|her|their) feet)"
+    ):
+        yield "standing at the end", lambda p, fps: float(pelvis_height(p)[-max(1, round(fps / 4)) :].mean()) > _UP
+    if match := re.search(r"\bon (?:one|(?:the |his |her |their )?(left|right)) (?:leg|foot)\b", phrase.text):
+        lifted = [0, 1] if match[1] is None else [1] if match[1] == "left" else [0]
+        yield "standing on one leg", lambda p, fps: any(_lasts(foot_lifts(p)[:, one] > 0.1, 1.0, fps) for one in lifted)
+
+
+def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
+    hands = {"": (0, 1), "left": (0,), "right": (1,)}[limb]
+    rest = [hand for hand in (0, 1) if hand not in hands]
+    if phrase.has(
+        r"\b(?:rais|lift|puts?|putting|holds?)\w* (?:up )?(?:\w+ ){0,3}(?:arm|hand)s?\b", r"rais|lift|\bup\b"
+    ):
+        both = phrase.has(r"\b(?:arms|hands)\b") and not limb
+        yield (
+            "a raised arm",
+            lambda p, fps: (
+                (all if both else any)(_lasts(_over(p, "neck")[:, hand], 0.3, fps) for hand in hands)
+                and not any(_lasts(_over(p, "neck")[:, hand], 0.3, fps) for hand in rest)
+            ),
+        )
+    if phrase.has(r"\bwav(?:e|es|ing)\b"):
+        yield "a wave", lambda p, fps: max(wrist_swings(p, fps, amplitude=0.05)[hand] for hand in hands) >= 3
+    if phrase.has(r"\bhands? on (?:the |his |her |their )?(?:hips|waist)\b"):
+        yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip").all(axis=1), 0.5, fps)
+    if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(r"\b(?:punch|kick|jab|hook|uppercut)"):
+        yield "a throw", lambda p, fps: float(_wrist_speed(p, fps)[:, hands].max()) > 2.4
+    if phrase.has(r"\b(?:drink|sip|takes? a bite|eat)"):
+        yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
+    if phrase.has(
+        r"\b(?:pick|grab|touch\w* (?:the|his|her|their) (?:toes|feet|floor|ground))", r"\bup\b|toes|floor|feet"
+    ):
+        yield "a hand at the floor", lambda p, fps: float(_hands_over_floor(p).min()) < _DOWN
+
+
+def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
+    if phrase.has(r"\b(?:cartwheel|handstand|somersault|handspring|flips?\b|(?:back|front)flip|rolls?\b)"):
+        yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
+    if phrase.has(r"\b(?:sway|rock)"):
+        yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
+    if phrase.has(r"\bcrawl|\ball fours\b"):
+        yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
+    if phrase.has(r"\b(?:fall|falls|collapse)") and phrase.has(r"\b(?:down|floor|ground|over)\b"):
+        yield "a fall", lambda p, fps: float(_over_floor(p)[-max(1, round(fps / 4)) :].mean()) < _DOWN
+
+
+def _lasts(mask: np.ndarray, seconds: float, fps: float) -> bool:
+    return longest(mask) >= seconds * fps
+
+
+def _over(p: Array, joint: str) -> Array:
+    return hands_height(p, over=joint) > 0
+
+
+def _upright(p: Array) -> np.ndarray:
+    return torso_inclination(p) < _UPRIGHT
+
+
+def _over_floor(p: Array) -> Array:
+    """(frames,) leg lengths of the pelvis over the floor."""
+    return (p[:, 0, 1] - floor_height(p)) / leg_length(p)
+
+
+def _hands_over_floor(p: Array) -> Array:
+    """(frames,) leg lengths of the lower wrist over the floor."""
+    return (p[:, WRISTS, 1].min(axis=1) - floor_height(p)) / leg_length(p)
+
+
+def _near(p: Array, joint: str) -> np.ndarray:
+    """(frames, 2) whether each wrist is within a hand's length of the joint of its side."""
+    ends = p[:, [J[f"left_{joint}"], J[f"right_{joint}"]]]
+    return np.linalg.norm(p[:, WRISTS] - ends, axis=-1) < 0.3
+
+
+def _between_hands(p: Array) -> Array:
+    return np.linalg.norm(p[:, WRISTS[0]] - p[:, WRISTS[1]], axis=-1)
+
+
+def _hand_to_head(p: Array) -> Array:
+    return np.linalg.norm(p[:, WRISTS] - p[:, J["head"], None], axis=-1).min(axis=1)
+
+
+def _wrist_speed(p: Array, fps: float) -> Array:
+    return np.linalg.norm(np.gradient(in_body(p)[:, list(WRISTS)], axis=0), axis=-1) * fps
+
+
+def _from_start(p: Array) -> Array:
+    """(frames, 2) metres of the pelvis from where it began, along each axis of the floor."""
+    return np.abs(p[:, 0, [0, 2]] - p[0, 0, [0, 2]])
+
+
+def _feet(p: Array) -> Array:
+    """(frames,) how far to the left of the pelvis the middle of the feet is."""
+    return in_body(p)[:, list(ANKLES), 0].mean(axis=1)
+
+
+def _pace(p: Array, fps: float) -> float:
+    """m/s while somebody goes; 0 where nobody does."""
+    paces = speed(p, fps)
+    return float(np.median(paces[paces > 0.3])) if (paces > 0.3).any() else 0.0

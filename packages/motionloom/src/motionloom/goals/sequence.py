@@ -138,7 +138,9 @@ def split_actions(text: str) -> tuple[Part, ...]:
             rest = lasting if lasting != rest or not own else finite(rest)
         if not named and mood_of(rest) == "gerund":
             named = "a person"
-        items = [rest] if _SUBORDINATE.search(named) else _split_list(rest)  # "a guard who walks and stops is bored"
+        # "a guard who walks and stops is bored"; a run-up belongs to what it is for
+        whole_clause = _SUBORDINATE.search(named) or re.search(r"\brun-?up\b", rest, re.IGNORECASE)
+        items = [rest] if whole_clause else _split_list(rest)
         parts += [_sentence(named, finite(item)) for item in items]
     parts = resolve_ellipsis(parts)
     if not 1 < len(parts) <= MOST_PARTS:

@@ -64,7 +64,10 @@ def _hops(p: Array, fps: float, side: Side) -> int:
 
 
 def _squats(p: Array, fps: float, side: Side) -> int:
-    return _rises(-smooth(pelvis_height(p), odd(fps / 5)), 0.2)
+    """How often the pelvis goes down below the height of a chair and comes up again."""
+    height = smooth(pelvis_height(p), odd(fps / 5))
+    up = (height > 0.9)[(height < 0.76) | (height > 0.9)]  # between the two nothing is decided
+    return int((np.diff(up[np.argmax(up) :].astype(int)) > 0).sum()) if up.any() else 0
 
 
 def _kicks(p: Array, fps: float, side: Side) -> int:

@@ -197,7 +197,7 @@ def _counts(p: Array, paces: Array, ends: str) -> dict[str, int]:
     else:
         found["jumps"] = jumps
     if found.get("jumps") == 0 and level:
-        found["squats"] = count("squats", p, RATE) - int(ends != "standing" and low[0] > LOW)
+        found["squats"] = count("squats", p, RATE)
     if ends == "standing" and "jumping jacks" not in found:
         found["kicks"] = count("kicks", p, RATE)
     if not any(found.values()) and low.min() > LOW and level:

@@ -22,8 +22,10 @@ class Generate(Finish, Adapted):
     seconds: float | None = seconds(
         "length of each motion: 5, on stairs 4, or of several actions in a sentence what they take"
     )
-    as_one: bool = declare("flag", "do not part 'A, then B' into actions that follow each other", False)
-    literal: bool = declare("flag", "do not read numbers as goals: '3 meters', 'turns left 90 degrees'", False)
+    as_one: bool = declare("flag", "one motion of the whole sentence, 'A, then B' too; numbers are not read", False)
+    literal: bool = declare(
+        "flag", "the words as they are: '3 meters' is no goal, and what is missing is not generated again", False
+    )
     sampling: Sampling = group(Sampling(count=1), *SAMPLED, "solver")
 
 

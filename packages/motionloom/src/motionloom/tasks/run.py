@@ -15,7 +15,7 @@ import numpy as np
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import Goal
 from motionloom.goals.hold import FixedJoints
-from motionloom.goals.timeline import Timeline
+from motionloom.goals.timeline import Timeline, single_segment
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
@@ -248,11 +248,11 @@ def _run_rows(plans: Sequence[Plan], models: Models, progress: Progress) -> Iter
             Result((one.motion,), measures={"missed": list(one.missed)}, remarks=list(one.missed), about=one)
             for one in controlled
         )
-    elif first.timeline is not None:
-        timelines = [plans[i].timeline or first.timeline for i, _ in rows]
-        results = map(
-            _worded_result, worded.generate_timelines(prior, timelines, foot_lock=first.values.foot_lock, **how)
-        )
+    elif first.timeline is not None or not first.values.as_one:
+        timelines = [plans[i].timeline or single_segment(plans[i].prompt, plans[i].seconds) for i, _ in rows]
+        attempts = 1 if first.values.as_one or first.values.literal else worded.ATTEMPTS
+        how |= {"attempts": attempts, "foot_lock": first.values.foot_lock}
+        results = map(_worded_result, worded.generate_timelines(prior, timelines, **how))
     else:
         frames = [text.frames_in(plans[i].seconds, prior.fps) for i, _ in rows]
         features = text.sample_features(prior, prompts, frames, padded=True, **how)

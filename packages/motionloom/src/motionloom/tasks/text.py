@@ -75,6 +75,7 @@ def generate(
     *,
     seconds: float | Sequence[float] | None = None,
     literal: bool = False,
+    as_one: bool = False,
     foot_lock: bool = True,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
@@ -87,8 +88,11 @@ def generate(
         prompts: what the person does, one text or several.
         seconds: length, one for all or one per prompt, at the prior's frame rate (20 per second; BABEL's 30); None:
             what numbers in the words need, or 5 (on stairs 4).
-        literal: leave numbers in the words to the network. Otherwise "3 meters", "turns left 90 degrees", "jumps twice"
-            are kept; `tasks.worded.generate_worded` says what was read and what was drawn of it.
+        literal: the words as they are. Otherwise numbers in them ("3 meters", "turns left 90 degrees", "jumps twice")
+            are kept, and what they say plainly (a turn to the left, a wave) is looked for in the motion: where it is
+            missing, up to three more are generated from seeds that depend on the motion's own, and the best is kept.
+            `tasks.worded.generate_worded` returns what was read, measured and missing too.
+        as_one: literal, and one motion of the whole sentence. Otherwise "A, then B" is generated one after the other.
         foot_lock: keep planted feet still, and feet above the floor.
         sampling: how it is sampled; single settings of it may be given as keywords: ``count=2, seed=3, steps=12``.
             Motion i of the answer is sampled from ``seed + i`` alone, or with ``best_of`` (2 to 16) from the best of so
@@ -108,6 +112,7 @@ def generate(
         prompts,
         seconds=seconds,
         literal=literal,
+        as_one=as_one,
         foot_lock=foot_lock,
         sampling=sampling,
         progress=progress,

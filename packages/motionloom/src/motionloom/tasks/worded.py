@@ -1,15 +1,19 @@
-"""Sentences as motions: one action or several, with the numbers in the words measured, and sampled again.
+"""Sentences as motions: one action or several; what the words say plainly is looked for, and sampled again.
 
 A number that the words say is a goal or a length (`motionloom.goals.timeline.timeline_of`). Turns and ways are
 met; steps and repetitions are counted in the motion, and where the number differs it is sampled again from another
-seed, with a shorter or longer way or stroke, `TRIES` times at most. The result is the one with the least missing.
+seed, with a shorter or longer way or stroke, `TRIES` times at most. What else the words say plainly
+(`motionloom.goals.expected`: a turn to the left, a wave, a kick of the right leg) is looked for in `ATTEMPTS` motions
+at most. The result is the one with the least missing.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import groupby
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -18,6 +22,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
+from motionloom.goals.expected import missing
 from motionloom.goals.remarks import numbers_read, parts_read, remarks_on
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
@@ -31,9 +36,13 @@ from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
+from motionloom.tasks.watching import watching
 from motionloom.weights.prior import Prior
 
-TRIES = 6
+TRIES, ATTEMPTS = 6, 4
+"""Motions of which the best is kept: where numbers are counted, and where the words are plain without numbers."""
+_TOGETHER = 256
+"""Motions that are sampled and looked at together."""
 STILL = 1.5
 ENDS_STILL, MOSTLY_STILL = 0.3, 0.8
 """Shares of a motion after which standing still at its end is reported: with unknown words, and with any."""
@@ -69,8 +78,21 @@ class Worded:
     """The generated timeline, segment by segment."""
     amounts: tuple[Measured, ...]
     """The numbers in the words, in their order."""
+    attempts: int = 1
+    """Motions in which what the words say plainly was looked for, at most."""
     unknown: Mapping[str, str] = field(default_factory=dict)
     """The texts that the weights do not know, each with a sentence about it (`motionloom.goals.remarks`)."""
+
+    @cached_property
+    def missing(self) -> list[str]:
+        """What else the words say plainly and the motion does not show: "a turn to the left"."""
+        places, begins = self.motion.positions(), self.timeline.begins
+        counted = {i for one in self.timeline.readings for i in range(one.first, one.end)}
+        free = [i for i in range(len(begins) - 1) if i not in counted]
+        texts = [segment.text for segment in self.timeline.segments]
+        if len(texts) == 1 and free:
+            return missing(texts[0], places, self.motion.fps)
+        return [name for i in free for name in missing(texts[i], places[begins[i] : begins[i + 1]], self.motion.fps)]
 
     @property
     def remarks(self) -> list[str]:
@@ -81,9 +103,11 @@ class Worded:
 
     @property
     def shortfalls(self) -> list[str]:
-        """A sentence for each number that was missed, and for an end where nothing happens any more."""
+        """A sentence for each number that was missed, for what is not shown, and for an end where nothing happens."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
-        return [*filter(None, [*(amount.problem for amount in self.amounts), self.stillness(of=share)])]
+        looked = self.attempts > 1 and self.missing
+        unseen = f"not found in {self.attempts} attempts: {', '.join(self.missing)}" if looked else ""
+        return [*filter(None, [*(amount.problem for amount in self.amounts), unseen, self.stillness(of=share)])]
 
     @property
     def still_from(self) -> float | None:
@@ -134,6 +158,7 @@ def generate_worded(
     *,
     seconds: float | Sequence[float] | None = None,
     literal: bool = False,
+    as_one: bool = False,
     foot_lock: bool = True,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
@@ -154,15 +179,20 @@ def generate_worded(
     if not texts:
         raise MotionloomError("nothing to make: no prompt; give at least one")
     check_prompts(texts)
-    timelines = [
-        goal_timeline.single_segment(text, usual_seconds(text) if length is None else length)
-        if literal
-        else read(prior, text, length, parted=False)
+    readings = [
+        read(prior, text, length, parted=not as_one, amounts=not (literal or as_one))
         for text, length in zip(texts, lengths, strict=True)
-        for _ in range(chosen.number())
     ]
-    seeds = chosen.seeds(len(timelines))
-    motions = generate_timelines(prior, timelines, seeds=seeds, foot_lock=foot_lock, sampling=chosen, progress=progress)
+    timelines = [timeline for timeline in readings for _ in range(chosen.number())]
+    motions = generate_timelines(
+        prior,
+        timelines,
+        seeds=chosen.seeds(len(timelines)),
+        attempts=1 if literal or as_one else ATTEMPTS,
+        foot_lock=foot_lock,
+        sampling=chosen,
+        progress=progress,
+    )
     texts = [segment.text for one in timelines for segment in one.segments]
     unknown = {one.text: one.line for one in remarks_on(texts, prior.known, prior.text)}
     return [
@@ -176,60 +206,120 @@ def generate_timelines(
     timelines: Sequence[Timeline],
     *,
     seeds: Sequence[int],
+    attempts: int = ATTEMPTS,
     foot_lock: bool = True,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Worded]:
     """The motions of timelines in their order, each from its own seed; those of one free action are sampled together.
 
-    seeds: one per timeline. foot_lock, sampling: as of `motionloom.generate`, but that the sampling's ``seed`` and
-    ``count`` are not looked at. Raises `MotionloomError` for an impossible request.
+    seeds: one per timeline. attempts: motions in which the words are looked for, at most; 1: the first is kept.
+    foot_lock, sampling: as of `motionloom.generate`, but that the sampling's ``seed`` and ``count`` are not looked at.
+    Raises `MotionloomError` for an impossible request.
     """
     sampling, done = sampling or Sampling(), 0
     if sampling.solver != SOLVER and any(len(one.segments) > 1 for one in timelines):
         raise MotionloomError(
-            f"several actions one after the other are drawn with the solver {SOLVER} alone; got {sampling.solver}"
+            f"several actions one after the other are drawn with the solver {SOLVER} alone; got {sampling.solver}; "
+            "choose that one, or leave the sentence whole (as_one)"
         )
+    how: dict[str, Any] = {"attempts": attempts, "foot_lock": foot_lock}
     for free, run in groupby(timelines, _is_free):
         several = list(run)
         if free:
-            sampled = generate_each(
-                prior,
-                [one.segments[0].text for one in several],
-                [one.segments[0].seconds for one in several],
-                seeds=seeds[done : done + len(several)],
-                foot_lock=foot_lock,
-                sampling=sampling,
-                progress=progress,
-            )
-            for number, motion in _in_order(sampled):
-                yield Worded(motion, several[number], ())
-            done += len(several)
+            for begin in range(0, len(several), _TOGETHER):
+                some = several[begin : begin + _TOGETHER]
+                own = seeds[done : done + len(some)]
+                yield from _best_attempts(prior, some, seeds=own, sampling=sampling, progress=progress, **how)
+                done += len(some)
             continue
         for one in several:
-            yield _best_try(prior, one, replace(sampling, count=1), seeds[done], foot_lock)
+            yield _best_try(prior, one, sampling=replace(sampling, count=1), seed=seeds[done], **how)
             done += 1
             if progress:
                 progress(done, len(timelines))
 
 
-def _best_try(prior: Prior, timeline: Timeline, sampling: Sampling, seed: int, foot_lock: bool) -> Worded:
-    """The sample that misses the least of what can be counted, of `TRIES` at most."""
-    tries, shares, best = [], [1.0] * len(timeline.readings), None
-    for number in range(TRIES):
-        own = seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
+def _best_attempts(
+    prior: Prior,
+    timelines: Sequence[Timeline],
+    *,
+    seeds: Sequence[int],
+    attempts: int,
+    foot_lock: bool,
+    sampling: Sampling,
+    progress: Progress | None,
+) -> Iterator[Worded]:
+    """Motions of one free action each, in order; of each the attempt with the least missing, the first of equals."""
+    best: dict[int, Worded] = {}
+    unseen, finished = list(range(len(timelines))), 0
+    first, later = _once_at_its_end(progress)
+    for number in range(attempts):
+        sampled = generate_each(
+            prior,
+            [timelines[i].segments[0].text for i in unseen],
+            [timelines[i].segments[0].seconds for i in unseen],
+            seeds=[_attempt_seed(seeds[i], number) for i in unseen],
+            foot_lock=foot_lock,
+            sampling=sampling,
+            progress=later if number else first,
+        )
+        again = set(unseen)
+        with watching(lambda denoised: None) if number else nullcontext():  # what is watched is the first attempt
+            for place, motion in sampled:
+                i = unseen[place]
+                attempt = Worded(motion, timelines[i], (), attempts)
+                if i not in best or len(attempt.missing) < len(best[i].missing):
+                    best[i] = attempt
+                if number + 1 == attempts or not best[i].missing:
+                    again.remove(i)
+                while finished in best and finished not in again:
+                    yield best.pop(finished)
+                    finished += 1
+        unseen = sorted(again)
+        if not unseen:
+            return
+
+
+def _once_at_its_end(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
+    """What the first attempt reports to, and the later ones, which stay at the end of the first: they may cancel."""
+    if progress is None:
+        return None, None
+    calls = 1
+
+    def first(done: int, of: int) -> None:
+        nonlocal calls
+        calls = of
+        progress(done, of)
+
+    return first, lambda done, of: progress(calls, calls)
+
+
+def _attempt_seed(seed: int, number: int) -> int:
+    """The seed of an attempt: the motion's own, then others that depend on it alone."""
+    return seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
+
+
+def _best_try(
+    prior: Prior, timeline: Timeline, *, sampling: Sampling, seed: int, attempts: int, foot_lock: bool
+) -> Worded:
+    """The sample that misses the least of what can be counted, then of what else the words say plainly."""
+    least, shares, best = (np.inf, 0), [1.0] * len(timeline.readings), None
+    counts = any(reading.amount.kind in ("count", "steps") for reading in timeline.readings)
+    for number in range(TRIES if counts else attempts):
         now = _scaled(timeline, shares)
-        motion = _sample_timeline(prior, now, replace(sampling, seed=own, first=0), foot_lock)
-        candidate = Worded(motion, now, _measure_amounts(now, motion))
+        own = replace(sampling, seed=_attempt_seed(seed, number), first=0)
+        motion = _sample_timeline(prior, now, own, foot_lock)
+        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts)
         counted = [
             one
             for one, reading in zip(candidate.amounts, now.readings, strict=True)
             if reading.amount.kind in ("count", "steps")
         ]
-        off = sum(abs(one.asked - one.measured) for one in counted)
-        if best is None or off < tries[0]:
-            best, tries = candidate, [off]
-        if not off:
+        off = sum(abs(one.asked - one.measured) for one in counted), len(candidate.missing)
+        if best is None or off < least:
+            best, least = candidate, off
+        if not off[0] and (not off[1] or number + 1 >= attempts):
             break
         shares = [
             share * float(np.clip((one.asked / max(one.measured, 0.5)) ** 0.5, 0.75, 1.35))
@@ -282,14 +372,3 @@ def _measure_amounts(timeline: Timeline, motion: Motion) -> tuple[Measured, ...]
 def _is_free(timeline: Timeline) -> bool:
     """Whether it is one action without a number to keep."""
     return len(timeline.segments) == 1 and timeline.segments[0].goal is None and not timeline.readings
-
-
-def _in_order(numbered: Iterator[tuple[int, Motion]]) -> Iterator[tuple[int, Motion]]:
-    """Motions in the order of their numbers; they come in another one."""
-    waiting: dict[int, Motion] = {}
-    number = 0
-    for place, motion in numbered:
-        waiting[place] = motion
-        while number in waiting:
-            yield number, waiting.pop(number)
-            number += 1
