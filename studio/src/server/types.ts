@@ -11,9 +11,9 @@ export interface GenerateRequest {
   readonly prompt: string;
   /** length of each motion: 5, on stairs 4, or of several actions in a sentence what they take, in seconds */
   readonly seconds?: number;
-  /** do not part 'A, then B' into actions that follow each other */
+  /** one motion of the whole sentence, 'A, then B' too; numbers are not read */
   readonly as_one?: boolean;
-  /** do not read numbers as goals: '3 meters', 'turns left 90 degrees' */
+  /** the words as they are: '3 meters' is no goal, and what is missing is not generated again */
   readonly literal?: boolean;
   /** the first motion's seed, the next have the next */
   readonly seed?: number;

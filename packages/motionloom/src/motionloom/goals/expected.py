@@ -57,9 +57,16 @@ _GAIT = (
     r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|pace|step)"
     r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b"
 )
-_BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing)? (?:up|away)|few steps back)\b"
-_IN_PLACE = r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)|up and down)\b"
+_BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing) (?:up|away)|few steps back)\b|^back (?:up|away)\b"
+_IN_PLACE = (
+    r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)"
+    r"|(?:jump|hop|bounc)\w* up and down)\b"
+)
 _NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
+_TUMBLES = (
+    r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
+    r"|rolls? (?:over|forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
+)
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
 
@@ -197,14 +204,14 @@ def _paces(phrase: _Phrase) -> Iterator[_Named]:
 
 
 def _postures(phrase: _Phrase) -> Iterator[_Named]:
-    sits = phrase.has(r"\b(?:sit|sits|sitting|sat|takes? a seat|taking a seat)\b")
+    sits = phrase.has(r"\b(?:sit|sits|sitting|sat|takes? a seat|taking a seat)\b(?!-| ups?\b)")
     if sits and phrase.has(_FLOOR):
         yield "sitting on the floor", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & _upright(p), 1.0, fps)
     elif sits:
         yield "sitting", lambda p, fps: bool(seats(p, fps, shortest=0.5))
     elif phrase.has(r"\b(?:chair|seat|bench|stool)\b") and "change" in phrase.kinds:
         yield "sitting at the start", lambda p, fps: any(one.begin < 1 for one in seats(p, fps, shortest=0.25))
-    if phrase.has(r"\b(?:lie|lies|lying|lays?|laying)\b") and not phrase.has(
+    if phrase.has(r"\b(?:lie|lies|lying)\b|\blay(?:s|ing)? down\b") and not phrase.has(
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
     ):
         yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > _FLAT), 0.5, fps)
@@ -233,24 +240,24 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
                 and not any(_lasts(_over(p, "neck")[:, hand], 0.3, fps) for hand in rest)
             ),
         )
-    if phrase.has(r"\bwav(?:e|es|ing)\b"):
+    if phrase.has(r"(?<!\ba )(?<!\bthe )\bwav(?:e|es|ing)\b"):
         yield "a wave", lambda p, fps: max(wrist_swings(p, fps, amplitude=0.05)[hand] for hand in hands) >= 3
     if phrase.has(r"\bhands? on (?:the |his |her |their )?(?:hips|waist)\b"):
-        yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip").all(axis=1), 0.5, fps)
+        yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
     if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(r"\b(?:punch|kick|jab|hook|uppercut)"):
         yield "a throw", lambda p, fps: float(_wrist_speed(p, fps)[:, hands].max()) > 2.4
     if phrase.has(r"\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(
-        r"\b(?:pick|grab|touch\w* (?:the|his|her|their) (?:toes|feet|floor|ground))", r"\bup\b|toes|floor|feet"
+        r"\b(?:pick|grab|touch)", r"\b(?:floor|ground|bends?|bending|stoops?|(?:the|his|her|their) (?:toes|feet))\b"
     ):
         yield "a hand at the floor", lambda p, fps: float(_hands_over_floor(p).min()) < _DOWN
 
 
 def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
-    if phrase.has(r"\b(?:cartwheel|handstand|somersault|handspring|flips?\b|(?:back|front)flip|rolls?\b)"):
+    if phrase.has(_TUMBLES):
         yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
-    if phrase.has(r"\b(?:sway|rock)"):
+    if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
     if phrase.has(r"\bcrawl|\ball fours\b"):
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
@@ -262,7 +269,7 @@ def _lasts(mask: np.ndarray, seconds: float, fps: float) -> bool:
     return longest(mask) >= seconds * fps
 
 
-def _over(p: Array, joint: str) -> Array:
+def _over(p: Array, joint: str) -> np.ndarray:
     return hands_height(p, over=joint) > 0
 
 
@@ -281,9 +288,9 @@ def _hands_over_floor(p: Array) -> Array:
 
 
 def _near(p: Array, joint: str) -> np.ndarray:
-    """(frames, 2) whether each wrist is within a hand's length of the joint of its side."""
+    """(frames,) whether both wrists are within a hand's length of the joint of their side."""
     ends = p[:, [J[f"left_{joint}"], J[f"right_{joint}"]]]
-    return np.linalg.norm(p[:, WRISTS] - ends, axis=-1) < 0.3
+    return np.linalg.norm(p[:, WRISTS] - ends, axis=-1).max(axis=1) < 0.3
 
 
 def _between_hands(p: Array) -> Array:
