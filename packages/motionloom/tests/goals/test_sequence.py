@@ -84,6 +84,8 @@ SEQUENCES = {
         "a person walks forward",
     ],
     "she sits down on a chair, then gets back up": ["she sits down on a chair", "she stands up again"],
+    "a man takes a seat and gets back on his feet": ["a man takes a seat", "a man stands up again"],
+    "grandpa gets up out of his chair and walks away": ["grandpa gets up out of his chair", "grandpa walks away"],
     "she sits down on the floor, then comes back up": ["she sits down on the floor", "she stands up from the floor"],
     # what only ends an action stays with it
     "a person bows, straightens up and walks away": ["a person bows and straightens up", "a person walks away"],
@@ -101,6 +103,8 @@ WHOLES = [
     "he walks through the door that opens and closes",
     "a guard who walks and stops is bored",
     "somebody takes a run-up and leaps",
+    "the woman bends down and grabs a coin off the floor",
+    "bend over with straight legs and reach your fingers down to your feet",
     "a person stands next to a wall",
     "she walks slowly before the judges sit down",
     "a man jumps because he won the race and cheers",

@@ -290,7 +290,8 @@ def _split_list(clause: str) -> list[str]:
     kinds = kind_of(items[0], mood), kind_of(items[1], mood)
     counted = "gesture" not in kinds and any(read_amount(item) for item in items)
     waits = kinds[0] == "state" and bool(_WAITS.match(items[1]))  # "stands there and waits"
-    return items if comma or counted or (_follows(*kinds) and not waits) else [clause]
+    bends = verb_of(items[0], mood) in _BENDS and verb_of(items[1], mood) in _GRASPS and not comma
+    return items if comma or counted or (_follows(*kinds) and not waits and not bends) else [clause]
 
 
 def _follows(first: str, second: str) -> bool:
@@ -370,10 +371,16 @@ _STAYS = re.compile(
     r"|holds? (?:it|that|this|still|(?:the|this|that) po(?:se|sition))",
     re.IGNORECASE,
 )
+_BENDS, _GRASPS = (
+    ("bend", "stoop", "crouch", "lean"),
+    ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
+)
+"""Somebody bends and grasps at once."""
 _WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
 """Who stays somewhere after these stands still, which is an action of its own."""
 _UP_AGAIN = re.compile(
-    r"(?:get|come|go|rise)(?:es|s)? (?:right |straight )?(?:back )?(?:up|to (?:his|her|their|your) feet)(?: again)?",
+    r"(?:get|come|go|rise)(?:es|s)? (?:right |straight )?(?:back )?"
+    r"(?:up|(?:on)?to (?:his|her|their|your) feet|on (?:his|her|their|your) feet)(?: again)?",
     re.IGNORECASE,
 )
 _BACK_AGAIN = re.compile(r"(walk|run|jog|come|go)(?:es|s)? back\b.*|returns?\b.*", re.IGNORECASE)

@@ -43,6 +43,8 @@ def _gerund(stem: str) -> str:
 
 
 MOODS = _forms()
+_FORMS = {form for forms in MOODS.values() for form in forms}
+_ADVERBS = {"then", "again", "once", "twice", "just", "also", "first", "finally", "soon", "next", "and", "but", "now"}
 _KINDS = {base: kind for kind, words in reversed(_TABLES["kinds"].items()) for base in words}
 
 
@@ -52,7 +54,8 @@ def subject_of(clause: str) -> str:
     for count, word in enumerate(words[:7]):
         plain = word.strip(",").lower()
         if count == 0 and not re.fullmatch(_SUBJECT_WORDS, plain):
-            return ""
+            named = len(words) > 1 and words[1] in MOODS["third"] and plain not in _FORMS and not plain.endswith("ly")
+            return word if named and plain not in _ADVERBS else ""  # "grandpa walks"
         if count and (plain in ("is", "are", "was", "were") or plain in MOODS["third"] or plain in MOODS["past"]):
             before = words[:count]
             while len(before) > 1 and re.fullmatch(r"\w+ly|then", before[-1]):
