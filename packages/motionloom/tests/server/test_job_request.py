@@ -13,6 +13,7 @@ pytest.importorskip("starlette", reason="needs the extra 'studio'")
 from motionloom.errors import MotionloomError
 from motionloom.requests.fields import specs
 from motionloom.requests.tasks import REQUESTS
+from motionloom.server.drawing import batch_key
 from motionloom.server.job_request import JobRequest, read_request
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
@@ -70,6 +71,16 @@ def test_reading_leaves_no_files(project: Project) -> None:
     with pytest.raises(MotionloomError):
         read_request({"task": "compose", "timeline": {"segments": 3}}, project, Limits())
     assert not list(project.motions.iterdir())
+
+
+def test_requests_that_keep_their_first_motion_are_sampled_apart(project: Project) -> None:
+    """Of one network call either all motions are looked at, and some generated again, or none."""
+    body = {"task": "generate", "prompt": "a person walks", "seconds": 2}
+    keys = [
+        batch_key(read_request(body | more, project, Limits()))
+        for more in ({}, {"seed": 3}, {"literal": True}, {"as_one": True})
+    ]
+    assert keys[0] == keys[1] != keys[2] == keys[3]
 
 
 def test_a_goal_is_measured_item_by_item(project: Project) -> None:

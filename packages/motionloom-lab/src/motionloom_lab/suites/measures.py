@@ -148,7 +148,7 @@ def obedience(job: "Job", asked: Asked) -> Report:
     from motionloom_lab.suites import obey, physical
 
     run, seeds = job.run("obedience"), asked["seeds"]
-    generate = job.tools.generator(False)
+    generate = job.tools.generator(True)
     results = obey.run(run, generate=generate, seeds=seeds, paraphrases=asked["paraphrases"])
     return physical.obedience_report(results, run=run, settings={"seeds": seeds})
 

@@ -98,7 +98,9 @@ def batch_key(request: JobRequest) -> tuple[Any, ...] | None:
     if request.task != "generate" or request.call is not None or request.timeline is not None:
         return None
     alike = replace(request.sampling, seed=0, count=1)
-    return text.frames_in(request.seconds, RATE), alike, request.values.foot_lock, request.taught
+    values = request.values
+    once = values.as_one or values.literal  # nothing is generated again
+    return text.frames_in(request.seconds, RATE), alike, values.foot_lock, once, request.taught
 
 
 def at_once(request: JobRequest) -> bool:
