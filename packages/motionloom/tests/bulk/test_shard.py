@@ -425,7 +425,7 @@ def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: P
     prior, read = ready.prior, read_goal(goal, frames=20, folder=folder)
     segments = [Segment("a person walks", 1.0, transition=0.5), Segment("a person sits", 1.0, transition=0.5)]
     single = [
-        generate(prior, "a person walks", seconds=1.0, seed=3, steps=2)[0],
+        generate(prior, "a person walks", seconds=1.0, seed=3, steps=2, literal=True)[0],
         control(prior, "a person walks", read, seed=3, steps=2)[0].motion,
         joined(list(compose(prior, segments, seed=3, steps=2))),
         generate(prior, "turn left 90 degrees", seed=3, steps=2)[0],
