@@ -202,7 +202,7 @@ def pair(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
 
 
 def _made(live: Live | LivePair, minutes: float) -> dict[str, Any]:
-    dice, windows, drawn = random.Random(1), 0, live.drawn
+    dice, windows, drawn = random.Random(1), 0, live.window
     count = max(20, round(minutes * 60 * FPS))
     marks: list[float] = []
     begun, busy = time.monotonic(), time.process_time()
@@ -211,7 +211,7 @@ def _made(live: Live | LivePair, minutes: float) -> dict[str, Any]:
             whom = dice.choice([None, 0, 1]) if len(live.people) > 1 else None
             live.ask(_random(dice), whom)
         next(live)
-        windows, drawn = windows + (live.drawn != drawn), live.drawn
+        windows, drawn = windows + (live.window != drawn), live.window
         if (number + 1) % (count // 10) == 0:
             marks.append(round(_memory(), 1))
     return {

@@ -19,9 +19,9 @@ def rows(count: int) -> list[dict[str, Any]]:
     return [{"prompt": WORDS[i % 3], "seconds": (0.6, 1.0, 0.8)[i % 3], "seed": i} for i in range(count)]
 
 
-def written(path: Path, found: list[dict[str, Any]]) -> Path:
+def write_jobs(path: Path, job: list[dict[str, Any]]) -> Path:
     """Rows as a file of JSON lines."""
-    path.write_text("".join(json.dumps(row) + "\n" for row in found), encoding="utf-8")
+    path.write_text("".join(json.dumps(row) + "\n" for row in job), encoding="utf-8")
     return path
 
 

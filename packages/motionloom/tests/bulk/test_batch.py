@@ -29,7 +29,7 @@ from motionloom.bulk.maker import Options
 from motionloom.bulk.metadata import Result, read_batch
 from motionloom.bulk.shard import Batch, Task
 from motionloom.errors import MotionloomError
-from tests.bulk.rows import apart, options, positions, rows, written
+from tests.bulk.rows import apart, options, positions, rows, write_jobs
 
 ONE, TWO = Where(workers=1), Where(workers=2)
 COUNT = 40
@@ -37,27 +37,27 @@ COUNT = 40
 
 @pytest.fixture
 def jobs(folder: Path) -> Path:
-    return written(folder / "jobs.jsonl", rows(COUNT))
+    return write_jobs(folder / "jobs.jsonl", rows(COUNT))
 
 
 @pytest.fixture(scope="module")
 def exact(weights: str) -> dict[Any, Any]:
     """Every motion made by this process alone."""
-    found = batch(rows(COUNT), options=options(weights))
-    return {(one.about["text"], one.about["seed"]): one.motion.positions() for one in found if one.motion}
+    results = batch(rows(COUNT), options=options(weights))
+    return {(one.about["text"], one.about["seed"]): one.motion.positions() for one in results if one.motion}
 
 
 def test_the_best_of_several_is_that_of_a_single_call(weights: str) -> None:
     """Whatever rows are beside: what `generate` keeps."""
     row = {"prompt": "a person bows", "seconds": 1.0, "seed": 2, "best_of": 4}
-    (found,) = [
+    (motion,) = [
         one.motion for one in batch([row, *rows(3)], options=options(weights)) if one.about["text"] == row["prompt"]
     ]
     (alone,) = generate(Prior.load(weights), "a person bows", seconds=1.0, seed=2, best_of=4, steps=2, literal=True)
     (first,) = generate(Prior.load(weights), "a person bows", seconds=1.0, seed=2, steps=2, literal=True)
-    assert found is not None
-    assert np.abs(found.positions() - alone.positions()).max() < 3e-6
-    assert np.abs(found.positions() - first.positions()).max() > 1e-3
+    assert motion is not None
+    assert np.abs(motion.positions() - alone.positions()).max() < 3e-6
+    assert np.abs(motion.positions() - first.positions()).max() > 1e-3
 
 
 def check_whole(out: Path, exact: dict[Any, Any]) -> None:
@@ -79,21 +79,21 @@ def _table(out: Path) -> str:
 def test_processes_shares_and_another_order_make_the_same_motions(
     weights: str, jobs: Path, folder: Path, exact: dict[Any, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = options(weights)
-    found = list(batch(jobs, folder / "alone", options=asked, where=TWO))
-    assert [(one.row, one.state) for one in found] == [(i, "made") for i in range(COUNT)]
+    settings = options(weights)
+    results = list(batch(jobs, folder / "alone", options=settings, where=TWO))
+    assert [(one.row, one.state) for one in results] == [(i, "made") for i in range(COUNT)]
     check_whole(folder / "alone", exact)
 
     for number in (1, 0):
-        list(run(Jobs.of(jobs), folder / "shares", options=asked, where=Where(1, (number, 2))))
+        list(run(Jobs.of(jobs), folder / "shares", options=settings, where=Where(1, (number, 2))))
     check_whole(folder / "shares", exact)
 
     other = random.Random(3).sample(rows(COUNT), COUNT)
-    list(batch(other, folder / "shuffled", options=asked, where=ONE))
+    list(batch(other, folder / "shuffled", options=settings, where=ONE))
     assert apart(positions(folder / "shuffled"), exact) < 3e-6
 
     monkeypatch.setattr(batch_module, "alone", _nobody)  # all is done: nobody is started
-    list(batch(jobs, folder / "alone", options=asked, where=TWO))
+    list(batch(jobs, folder / "alone", options=settings, where=TWO))
 
 
 def _nobody(items: Iterator[Any], *_: Any, **__: Any) -> Iterator[Any]:
@@ -147,17 +147,17 @@ def wait_for(what: Callable[[], bool], process: "subprocess.Popen[str]") -> None
 
 def workers_of(out: Path) -> list[int]:
     """Processes of this machine that make motions for that folder."""
-    found = []
+    pids = []
     for place in Path("/proc").glob("[0-9]*"):
         try:
             if (
                 b"motionloom.bulk.worker" in (place / "cmdline").read_bytes()
                 and (place / "cwd").resolve() == out.parent
             ):
-                found.append(int(place.name))
+                pids.append(int(place.name))
         except OSError:
             continue
-    return found
+    return pids
 
 
 @pytest.mark.slow
@@ -171,9 +171,9 @@ def test_the_same_command_goes_on_where_a_driver_ended(
     begun = "manifest.json" if blow is signal.SIGINT else "records/000000.jsonl"
     wait_for(lambda: (out / begun).exists(), first)
     first.send_signal(blow)
-    _, said = first.communicate(timeout=60)
+    _, errors = first.communicate(timeout=60)
     assert first.returncode == (130 if blow is signal.SIGINT else -9)
-    assert said.endswith("motionloom: interrupted\n") == (blow is signal.SIGINT)
+    assert errors.endswith("motionloom: interrupted\n") == (blow is signal.SIGINT)
     wait_for(lambda: not workers_of(out), first)
     assert not workers_of(out)  # nobody outlives the driver
     assert not (out / "metadata.jsonl").exists()
@@ -196,16 +196,16 @@ def test_processes_share_out_the_gpus_that_may_be_used(process: int, visible: st
 @pytest.mark.slow
 def test_a_disk_that_is_full_ends_the_batch_in_a_sentence(weights: str, folder: Path) -> None:
     """Of a process that may write no file of more than 100 kB: a shard of all rows is larger, in the middle of one."""
-    jobs, out = written(folder / "jobs.jsonl", rows(COUNT)), folder / "out"
+    jobs, out = write_jobs(folder / "jobs.jsonl", rows(COUNT)), folder / "out"
 
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
     full = start(weights, jobs, out, "--format", "webdataset", "--workers", "1", preexec_fn=limit)
-    said = full.communicate(timeout=120)
-    assert (full.returncode, said[0]) == (2, "")
-    assert said[1].splitlines()[-1] == f"motionloom: cannot write to {out}: File too large"
+    outputs = full.communicate(timeout=120)
+    assert (full.returncode, outputs[0]) == (2, "")
+    assert outputs[1].splitlines()[-1] == f"motionloom: cannot write to {out}: File too large"
     assert not list(out.glob("shard-*"))
     assert not (out / ".work").exists()
     again = start(weights, jobs, out, "--format", "webdataset", "--workers", "1")
@@ -217,18 +217,18 @@ def test_a_cluster_where_nobody_works_is_said_once(task: Task | None, times: int
     ray = SimpleNamespace(cluster_resources=lambda: {"CPU": 1.0}, remote=lambda **_: lambda kind: kind)
     crew = on_ray._Crew(ray, iter(()), Batch("", "", "", {}, Options()), None, lambda rows: None)
     crew.flight = {"reference": ("actor", task)}
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         for _ in range(3 * on_ray.LONELY):
             crew._waited(False)
-    assert [str(one.message)[:24] for one in said] == ["no worker has begun for "] * times
+    assert [str(one.message)[:24] for one in warned] == ["no worker has begun for "] * times
 
 
 def test_results_come_without_a_folder_as_they_are_made(weights: str) -> None:
-    found: list[Result] = list(
+    results: list[Result] = list(
         islice(batch([{"prompt": ""}, *rows(3)], options=options(weights, filter="travel < 0")), 4)
     )
-    assert [(one.row, one.state) for one in found] == [(0, "failed"), (1, "dropped"), (2, "dropped"), (3, "dropped")]
+    assert [(one.row, one.state) for one in results] == [(0, "failed"), (1, "dropped"), (2, "dropped"), (3, "dropped")]
 
 
 @pytest.mark.parametrize(
@@ -258,40 +258,40 @@ def test_a_list_of_array_tasks_that_is_no_range_is_refused() -> None:
 
 
 def test_a_job_that_grew_keeps_its_shards_and_one_that_shrank_is_refused(weights: str, folder: Path) -> None:
-    asked, out = options(weights), folder / "out"
-    list(batch(rows(16), out, options=asked, where=ONE))
+    settings, out = options(weights), folder / "out"
+    list(batch(rows(16), out, options=settings, where=ONE))
     first = (out / "records/000000.jsonl").stat().st_mtime_ns
-    assert [one.state for one in batch(rows(20), out, options=asked, where=ONE)] == ["made"] * 20
+    assert [one.state for one in batch(rows(20), out, options=settings, where=ONE)] == ["made"] * 20
     assert (out / "records/000000.jsonl").stat().st_mtime_ns == first
     with pytest.raises(MotionloomError, match="more shards than the job"):
-        list(batch(rows(8), out, options=asked, where=ONE))
+        list(batch(rows(8), out, options=settings, where=ONE))
 
 
 def test_the_folder_of_another_job_is_refused_unless_it_is_to_go(weights: str, folder: Path) -> None:
-    asked, out = options(weights, shard_rows=2), folder / "out"
+    settings, out = options(weights, shard_rows=2), folder / "out"
     others = [{"prompt": "a dog", "seconds": 0.6, "seed": i} for i in range(4)]
-    list(batch(rows(4), out, options=asked, where=ONE))
+    list(batch(rows(4), out, options=settings, where=ONE))
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with pytest.raises(MotionloomError, match=r"another job: none of the first 4 .* --force"):
-        list(batch(others, out, options=asked, where=ONE))
+        list(batch(others, out, options=settings, where=ONE))
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
-    list(batch(others, out, options=asked, where=ONE, force=True))
+    list(batch(others, out, options=settings, where=ONE, force=True))
     assert {text for text, _ in positions(out)} == {"a dog"}
 
 
 @pytest.mark.parametrize(
     "change",
     [
-        lambda found: [{**found[0], "prompt": "a dog"}, *found[1:]],
-        lambda found: [{**row, "seconds": 0.5} for row in found],
-        lambda found: [{"prompt": "a dog", "seconds": 0.6}, *found[:3]],
+        lambda job: [{**job[0], "prompt": "a dog"}, *job[1:]],
+        lambda job: [{**row, "seconds": 0.5} for row in job],
+        lambda job: [{"prompt": "a dog", "seconds": 0.6}, *job[:3]],
     ],
     ids=["one row", "all lengths", "one before"],
 )
 def test_a_job_that_was_mended_is_the_same_job(weights: str, folder: Path, change: Callable[..., Any]) -> None:
-    asked, out = options(weights, shard_rows=1), folder / "out"
-    list(batch(rows(4), out, options=asked, where=ONE))
-    assert [one.state for one in batch(change(rows(4)), out, options=asked, where=ONE)] == ["made"] * 4
+    settings, out = options(weights, shard_rows=1), folder / "out"
+    list(batch(rows(4), out, options=settings, where=ONE))
+    assert [one.state for one in batch(change(rows(4)), out, options=settings, where=ONE)] == ["made"] * 4
 
 
 @pytest.mark.parametrize(
@@ -309,14 +309,14 @@ def test_options_that_cannot_be_are_refused_before_anything_is_written(
 def test_what_only_a_process_finds_out_is_reported_in_its_sentence(
     weights: str, folder: Path, change: dict[str, Any]
 ) -> None:
-    asked = Options(**{"weights": weights, "steps": 2, **change})
+    settings = Options(**{"weights": weights, "steps": 2, **change})
     with pytest.raises(MotionloomError):
-        list(batch(rows(2), folder / "out", options=asked, where=ONE))
+        list(batch(rows(2), folder / "out", options=settings, where=ONE))
     assert not list(folder.glob("out/shard-*"))
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "sentence"),
     [
         ("1 / 0", r"a process that makes motions failed \(ZeroDivisionError: division by zero\)$"),
         ("import os; os._exit(7)", r"end before they begin, by exit code 7: what they printed says more$"),
@@ -325,11 +325,11 @@ def test_what_only_a_process_finds_out_is_reported_in_its_sentence(
     ids=["an exception", "an end", "a kill"],
 )
 def test_what_ends_every_process_is_told_and_memory_is_asked_for_where_one_was_killed(
-    weights: str, folder: Path, monkeypatch: pytest.MonkeyPatch, line: str, said: str
+    weights: str, folder: Path, monkeypatch: pytest.MonkeyPatch, line: str, sentence: str
 ) -> None:
     (folder / "fatal_judge.py").write_text(line + "\n")
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    with pytest.raises(MotionloomError, match=said):
+    with pytest.raises(MotionloomError, match=sentence):
         list(batch(rows(2), folder / "out", options=options(weights, judge="fatal_judge:judge"), where=ONE))
     assert not list(folder.glob("out/shard-*"))
 
@@ -339,9 +339,9 @@ def test_a_judge_that_fails_at_one_row_is_that_rows_error(
 ) -> None:
     (folder / "row_judge.py").write_text("def judge(text, places, fps):\n    return 1 / ('jumps' not in text) > 0\n")
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    found = list(batch(rows(6), folder / "out", options=options(weights, judge="row_judge:judge"), where=ONE))
-    assert [one.state for one in found] == ["made", "made", "failed"] * 2
-    assert "ZeroDivisionError: division by zero" in found[2].why
+    results = list(batch(rows(6), folder / "out", options=options(weights, judge="row_judge:judge"), where=ONE))
+    assert [one.state for one in results] == ["made", "made", "failed"] * 2
+    assert "ZeroDivisionError: division by zero" in results[2].why
 
 
 def test_the_table_has_a_row_for_every_row(weights: str, folder: Path) -> None:
@@ -360,8 +360,8 @@ def test_half_a_letter_in_a_prompt_is_written_everywhere(weights: str, folder: P
     """JSON allows half of a surrogate pair, UTF-8 does not: the record keeps it, the table has a '?' in its place."""
     parquet = pytest.importorskip("pyarrow.parquet")
     out = folder / "out"
-    asked = [{"prompt": "a person walks \ud800", "seconds": 0.6}, {"prompt": "", "id": "\udfff"}]
-    assert [one.state for one in batch(asked, out, options=options(weights), where=ONE)] == ["made", "failed"]
+    jobs = [{"prompt": "a person walks \ud800", "seconds": 0.6}, {"prompt": "", "id": "\udfff"}]
+    assert [one.state for one in batch(jobs, out, options=options(weights), where=ONE)] == ["made", "failed"]
     assert next(read_batch(out)).about["text"] == "a person walks \ud800"
     table = parquet.read_table(out / "metadata.parquet").to_pylist()
     assert [row["text"] for row in table] == ["a person walks ?", None]
@@ -378,7 +378,7 @@ def test_memory_of_the_driver_does_not_grow_with_the_job(folder: Path) -> None:
     )
     (folder / "prompts.txt").write_text("a person walks\n" * 100)
     for variants in (100, 5000):
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", code, str(variants)],
             capture_output=True,
             text=True,
@@ -386,7 +386,7 @@ def test_memory_of_the_driver_does_not_grow_with_the_job(folder: Path) -> None:
             timeout=120,
             env={**os.environ},
         )
-        counts, grown = done.stdout.splitlines()
+        counts, grown = process.stdout.splitlines()
         assert counts == f"{100 * variants} {100 * variants}"
         assert int(grown) < 8_000  # kB
 

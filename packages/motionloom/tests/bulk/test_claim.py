@@ -19,7 +19,7 @@ from motionloom.bulk.claim import STALE, Driver, Share, claim, living, names
 from motionloom.bulk.folder import Store
 from motionloom.bulk.metadata import read_batch
 from motionloom.errors import MotionloomError
-from tests.bulk.rows import options, rows, written
+from tests.bulk.rows import options, rows, write_jobs
 from tests.bulk.test_batch import start
 
 OUT = Path("out")
@@ -91,8 +91,8 @@ def test_the_claim_of_a_killed_driver_is_taken_over_and_told() -> None:
         pass
     first.send_signal(signal.SIGKILL)  # a dead one that nobody has waited for yet is dead, too
     eventually(lambda: living(OUT) is None)
-    with pytest.warns(UserWarning, match=f"process {first.pid} .*is gone"), claim(OUT, (0, 1)) as taken:
-        taken.check()
+    with pytest.warns(UserWarning, match=f"process {first.pid} .*is gone"), claim(OUT, (0, 1)) as share:
+        share.check()
     first.communicate()
     assert list(OUT.iterdir()) == []
 
@@ -176,37 +176,37 @@ def test_work_of_a_driver_who_lives_is_not_cleared() -> None:
 
 
 def test_a_batch_makes_nothing_in_a_folder_that_somebody_has(weights: str) -> None:
-    asked = options(weights, shard_rows=2)
-    list(batch(rows(4), OUT, options=asked, where=Where(workers=1)))
+    settings = options(weights, shard_rows=2)
+    list(batch(rows(4), OUT, options=settings, where=Where(workers=1)))
     place = of_another(name="first")
     before = everything()
     here = Where(workers=1)
     for job, where in ((rows(6), here), ([{"prompt": "a dog"}], here), (rows(6), Where(ray=LOCAL))):
         for force in (False, True):
             with pytest.raises(MotionloomError, match="is being made by process"):
-                list(batch(job, OUT, options=asked, where=where, force=force))
+                list(batch(job, OUT, options=settings, where=where, force=force))
     assert everything() == before
     place.unlink()
-    assert [one.state for one in batch(rows(6), OUT, options=asked, where=Where(workers=1))] == ["made"] * 6
+    assert [one.state for one in batch(rows(6), OUT, options=settings, where=Where(workers=1))] == ["made"] * 6
     assert not (OUT / ".work").exists()
 
 
 @pytest.mark.slow
 def test_of_two_drivers_that_begin_at_once_one_makes_everything(weights: str, folder: Path) -> None:
-    jobs, out = written(folder / "jobs.jsonl", rows(60)), folder / "out"
+    jobs, out = write_jobs(folder / "jobs.jsonl", rows(60)), folder / "out"
     both = [start(weights, jobs, out, "--workers", "1", "--shard-rows", "6") for _ in range(2)]
-    said = {one.pid: one.communicate(timeout=200)[1] for one in both}
+    errors = {one.pid: one.communicate(timeout=200)[1] for one in both}
     winners = [one.pid for one in both if one.returncode == 0]
     assert {one.returncode for one in both} <= {0, 2}
     assert winners  # both, where one had ended before the other looked
     for one in both:
-        assert one.returncode == 0 or f"is being made by process {winners[0]} on" in said[one.pid]
+        assert one.returncode == 0 or f"is being made by process {winners[0]} on" in errors[one.pid]
     assert [one.state for one in read_batch(out, motions=False)] == ["made"] * 60
 
 
 @pytest.mark.slow
 def test_a_second_driver_says_who_works_there_though_that_one_sleeps(weights: str, folder: Path) -> None:
-    jobs, out = written(folder / "jobs.jsonl", rows(60)), folder / "out"
+    jobs, out = write_jobs(folder / "jobs.jsonl", rows(60)), folder / "out"
     first = start(weights, jobs, out, "--workers", "1", "--shard-rows", "6")
     eventually(lambda: living(out) is not None)
     first.send_signal(signal.SIGSTOP)

@@ -18,7 +18,7 @@ from motionloom.bulk.row import parse
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal_file import read_goal
 from motionloom.tasks.pair import generate_pair
-from tests.bulk.rows import options, written
+from tests.bulk.rows import options, write_jobs
 from tests.bulk.test_shard import OUT, make
 
 DUET = {"task": "duet", "prompt": "a person waves :: a person bows", "seconds": 1, "seed": 3}
@@ -31,11 +31,11 @@ def ready(weights: str, pair_weights: str) -> Maker:
     return Maker(options(weights, pair_weights=pair_weights), folder=Path())
 
 
-def made(maker: Maker, *rows: dict[str, Any]) -> list[Made]:
-    maker.sources._cache.clear()
-    found = [one for _, one in maker.make([ask(maker, row) for row in rows])]
-    assert all(isinstance(one, Made) for one in found), found
-    return found  # type: ignore[return-value]
+def takes(maker: Maker, *rows: dict[str, Any]) -> list[Made]:
+    maker.sources._files.clear()
+    results = [one for _, one in maker.make([ask(maker, row) for row in rows])]
+    assert all(isinstance(one, Made) for one in results), results
+    return results  # type: ignore[return-value]
 
 
 def ask(maker: Maker, row: dict[str, Any]) -> Any:
@@ -48,10 +48,10 @@ def apart(a: Any, b: Any) -> float:
 
 def test_a_duet_is_that_of_the_single_task_whatever_is_beside_it(ready: Maker) -> None:
     other = DUET | {"seed": 4}
-    (alone,) = made(ready, DUET)
+    (alone,) = takes(ready, DUET)
     single = generate_pair(ready.prior, ready.models.block, DUET["prompt"], seconds=1.0, seed=3, steps=2)[0]
     assert apart(alone.people, single) == 0
-    both = made(ready, other, {"prompt": "a person walks", "seconds": 1}, DUET)
+    both = takes(ready, other, {"prompt": "a person walks", "seconds": 1}, DUET)
     assert [len(one.people) for one in both] == [1, 2, 2]
     assert apart(both[2].people, single) == 0
     assert apart(both[1].people, single) > 0.01
@@ -62,7 +62,7 @@ def test_motions_of_one_and_of_two_loop_where_that_is_asked(weights: str, pair_w
     looping = Maker(options(weights, pair_weights=pair_weights, loop=0.5), folder=Path())
     assert looping.options.of_motions("") != ready.options.of_motions("")
     rows = (DUET | {"seconds": 2}, {"prompt": "a person walks", "seconds": 2})
-    for plain, loop in zip(made(ready, *rows), made(looping, *rows), strict=True):
+    for plain, loop in zip(takes(ready, *rows), takes(looping, *rows), strict=True):
         assert len(plain.people) == len(loop.people)
         for one, other in zip(plain.people, loop.people, strict=True):
             assert np.array_equal(one.rotations[:-10], other.rotations[:-10])
@@ -85,15 +85,15 @@ def test_motions_of_one_and_of_two_loop_where_that_is_asked(weights: str, pair_w
 def test_both_people_are_written_read_back_and_carried_over(ready: Maker, kind: str, files: list[str] | None) -> None:
     if kind == "parquet":
         pytest.importorskip("pyarrow")
-    asked = replace(ready.options, format=kind)
-    found = [DUET | {"id": "a"}, {"prompt": "a person walks", "seconds": 1, "id": "b"}]
-    exact = made(ready, *found[:1])[0].people
-    assert make(ready, found, asked).counts == {"made": 2}
+    settings = replace(ready.options, format=kind)
+    job = [DUET | {"id": "a"}, {"prompt": "a person walks", "seconds": 1, "id": "b"}]
+    exact = takes(ready, *job[:1])[0].people
+    assert make(ready, job, settings).counts == {"made": 2}
     if files:
         assert sorted(path.name for path in (OUT / "shard-000000").iterdir()) == files
     for more in (0, 1):  # once made, once carried over into a larger shard
         if more:
-            assert make(ready, [*found, found[1] | {"seed": 1, "id": "c"}], asked).made == 1
+            assert make(ready, [*job, job[1] | {"seed": 1, "id": "c"}], settings).new_rows == 1
         duet, single = list(read_batch(OUT))[:2]
         assert (len(duet.people), len(single.people)) == (2, 1)
         hips = [
@@ -115,8 +115,8 @@ def test_every_task_comes_from_every_kind_of_file(ready: Maker, folder: Path) ->
         ("duet", "a :: b", 1.0, 3, None, json.dumps(GOAL), 2),
         ("duet", None, None, None, "two.yaml", None, None),
     ]
-    found: list[dict[str, Any]] = [dict(zip(columns, row, strict=True)) for row in table]
-    written(folder / "a.jsonl", found)
+    job: list[dict[str, Any]] = [dict(zip(columns, row, strict=True)) for row in table]
+    write_jobs(folder / "a.jsonl", job)
     with (folder / "a.csv").open("w", newline="") as file:
         csv.writer(file).writerows([columns, *table])
     keys = {"a.jsonl": [], "a.csv": []}
@@ -124,18 +124,18 @@ def test_every_task_comes_from_every_kind_of_file(ready: Maker, folder: Path) ->
         import pyarrow
         from pyarrow import parquet
 
-        parquet.write_table(pyarrow.Table.from_pylist(found), folder / "a.parquet")
+        parquet.write_table(pyarrow.Table.from_pylist(job), folder / "a.parquet")
         keys["a.parquet"] = []
     for name in keys:
-        asked = [ready.sources.ask(parse(row)) for row in Jobs.of(name).read()]
-        assert [one.row.task for one in asked] == [row[0] for row in table]
-        keys[name] = [one.key for one in asked]
-    assert len({tuple(found) for found in keys.values()}) == 1
+        orders = [ready.sources.ask(parse(row)) for row in Jobs.of(name).read()]
+        assert [one.row.task for one in orders] == [row[0] for row in table]
+        keys[name] = [one.key for one in orders]
+    assert len({tuple(job) for job in keys.values()}) == 1
     assert len(set(keys["a.csv"])) == len(table)
 
 
 def test_both_people_are_measured_and_both_must_pass(ready: Maker) -> None:
-    (one,) = made(ready, DUET)
+    (one,) = takes(ready, DUET)
     first, second = (dict[str, Any](person) for person in one.measured)
     together: dict[str, Any] = one.measures
     hips = np.linalg.norm(one.people[0].positions()[:, 0] - one.people[1].positions()[:, 0], axis=-1)
@@ -162,7 +162,7 @@ def test_the_table_has_a_line_for_a_duet(ready: Maker) -> None:
 
 def test_goals_and_timelines_of_two_people(ready: Maker, folder: Path) -> None:
     (folder / "two.yaml").write_text(TIMELINE)
-    long, first, second = made(
+    long, first, second = takes(
         ready, {"task": "duet", "timeline": "two.yaml"}, DUET | {"goal": GOAL}, DUET | {"goal": GOAL, "person": 2}
     )
     assert [len(one.people[0]) for one in (long, first, second)] == [40, 20, 20]
@@ -199,13 +199,13 @@ def test_everything_that_determines_a_duet_changes_its_key_and_no_other(weights:
         DUET | {"goal": GOAL},
         DUET | {"goal": GOAL, "person": 2},
     ]
-    found = {keys(DUET), keys(DUET, pair_guidance=0.5), keys(DUET, pair_weights="duet"), *map(keys, changed)}
-    assert len(found) == 7
+    distinct = {keys(DUET), keys(DUET, pair_guidance=0.5), keys(DUET, pair_weights="duet"), *map(keys, changed)}
+    assert len(distinct) == 7
     assert keys(alone) == keys(alone, pair_guidance=0.5) == keys(alone, pair_weights="duet")
 
 
 @pytest.mark.parametrize(
-    ("row", "said"),
+    ("row", "sentence"),
     [
         ({"prompt": "a waves :: b bows"}, "give the row the task duet"),
         ({"task": "duet", "prompt": "a :: b :: c"}, "words for each person"),
@@ -224,12 +224,12 @@ def test_everything_that_determines_a_duet_changes_its_key_and_no_other(weights:
     ],
 )
 def test_what_two_people_cannot_do_is_refused_before_anything_is_drawn(
-    ready: Maker, folder: Path, row: dict[str, Any], said: str
+    ready: Maker, folder: Path, row: dict[str, Any], sentence: str
 ) -> None:
     (folder / "two.yaml").write_text(TIMELINE)
     (folder / "walk.bvh").write_bytes((Path(__file__).parents[4] / "examples/clips/walk.bvh").read_bytes())
     (folder / "start.yaml").write_text(f"start: walk.bvh\n{TIMELINE}")
-    with pytest.raises(MotionloomError, match=said):
+    with pytest.raises(MotionloomError, match=sentence):
         ask(ready, row)
 
 

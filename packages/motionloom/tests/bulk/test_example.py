@@ -32,20 +32,20 @@ def test_an_actor_turns_columns_into_motions_and_leaves_out_what_cannot_be_made(
         "seconds": np.array([1.0, 1.0, 2.0]),
         "seed": np.array([3, 4, 5]),
     }
-    found = motions(columns)
-    assert sorted(zip(found["text"], (len(one) for one in found["positions"]))) == [
+    result = motions(columns)
+    assert sorted(zip(result["text"], (len(one) for one in result["positions"]))) == [
         ("a person sits", 40),
         ("a person walks", 20),
     ]
-    assert found["positions"][0].shape[1:] == (22, 3)
-    assert len({len(column) for column in found.values()}) == 1
+    assert result["positions"][0].shape[1:] == (22, 3)
+    assert len({len(column) for column in result.values()}) == 1
 
 
 @pytest.mark.slow
 def test_the_pipeline_runs_as_it_stands() -> None:
     pytest.importorskip("ray.data", exc_type=ImportError)
-    done = subprocess.run([sys.executable, EXAMPLE], capture_output=True, text=True, timeout=600, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    lines = done.stdout.splitlines()
+    process = subprocess.run([sys.executable, EXAMPLE], capture_output=True, text=True, timeout=600, check=False)
+    assert process.returncode == 0, process.stderr[-2000:]
+    lines = process.stdout.splitlines()
     assert len(lines) == 8
     assert all("(40, 22, 3) skate" in line for line in lines)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from motionloom.bulk.jobs import LARGEST, Jobs, shard_size
 from motionloom.errors import MotionloomError
-from tests.bulk.rows import rows, written
+from tests.bulk.rows import rows, write_jobs
 
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("C",)), min_size=1, max_size=30).filter(str.strip)
 
@@ -104,7 +104,7 @@ def test_shards_are_small_where_jobs_are_and_never_large(count: int) -> None:
 
 @given(count=st.integers(0, 60), size=st.integers(1, 20))
 def test_shards_are_all_rows_in_their_order(tmp_path_factory: pytest.TempPathFactory, count: int, size: int) -> None:
-    jobs = Jobs.of(written(tmp_path_factory.mktemp("shards") / "a.jsonl", rows(count)))
+    jobs = Jobs.of(write_jobs(tmp_path_factory.mktemp("shards") / "a.jsonl", rows(count)))
     parts = list(jobs.shards(size))
     assert [row for part in parts for row in part] == list(jobs.read())
     assert all(len(part) == size for part in parts[:-1])

@@ -95,13 +95,13 @@ def test_somebody_who_is_moved_stiffly_skates_at_just_that_speed() -> None:
     still = Motion(SMPL22, 20.0, np.zeros((40, 3)), turns)
     height = -still.positions()[..., 1].min()
     root = np.stack([np.zeros(40), np.full(40, height), np.arange(40) / 20], axis=-1)
-    found = measure(Motion(SMPL22, 20.0, root, turns), "")
-    assert found["skate"] == 1.0
-    assert found["skate_speed"] == pytest.approx(100)
-    assert found["speed"] == pytest.approx(1.0, rel=0.05)
-    assert found["peak_jerk"] == pytest.approx(0, abs=1e-3)
-    assert found["obeys"] is None
-    assert found.keys() == MEANING.keys()
+    values = measure(Motion(SMPL22, 20.0, root, turns), "")
+    assert values["skate"] == 1.0
+    assert values["skate_speed"] == pytest.approx(100)
+    assert values["speed"] == pytest.approx(1.0, rel=0.05)
+    assert values["peak_jerk"] == pytest.approx(0, abs=1e-3)
+    assert values["obeys"] is None
+    assert values.keys() == MEANING.keys()
 
 
 def test_a_judge_is_found_by_its_module_and_name() -> None:

@@ -19,22 +19,22 @@ COUNT = 24
 
 def actors(parent: int) -> list[int]:
     """Ray's processes of this machine that hold a prior, below this one."""
-    found = []
+    pids = []
     for place in Path("/proc").glob("[0-9]*"):
         try:
             if b"ray::Hand" in (place / "cmdline").read_bytes() and parent in _above(int(place.name)):
-                found.append(int(place.name))
+                pids.append(int(place.name))
         except (OSError, IndexError):
             continue
-    return found
+    return pids
 
 
 def _above(pid: int) -> set[int]:
-    found = set()
+    parents = set()
     while pid > 1:
-        found.add(pid)
+        parents.add(pid)
         pid = int((Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[1])
-    return found
+    return parents
 
 
 def test_ray_makes_the_same_motions_although_workers_are_killed(
@@ -59,9 +59,9 @@ def test_ray_makes_the_same_motions_although_workers_are_killed(
 
     killer = Thread(target=kill, daemon=True)
     killer.start()
-    found = list(batch(rows(COUNT), out, options=options(weights), where=Where(workers=1, ray=LOCAL)))
+    results = list(batch(rows(COUNT), out, options=options(weights), where=Where(workers=1, ray=LOCAL)))
     killer.join()
     assert kills
-    assert [(one.row, one.state) for one in found] == [(i, "made") for i in range(COUNT)]
+    assert [(one.row, one.state) for one in results] == [(i, "made") for i in range(COUNT)]
     assert apart(positions(out), exact) < 3e-6
     assert not capsys.readouterr().out  # there are results only, which may be JSON

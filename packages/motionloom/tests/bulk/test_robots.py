@@ -14,7 +14,7 @@ from motionloom.bulk.metadata import read_batch
 from motionloom.bulk.row import Sources, parse
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
-from tests.bulk.rows import options, written
+from tests.bulk.rows import options, write_jobs
 from tests.robots import models
 from tests.robots.people import marching
 
@@ -49,8 +49,8 @@ def test_rows_become_joint_angles_with_their_figures(robot: Robot, weights: str,
         {"motion": "march.npz", "robot": "tin.xml", "max_speed": 2.0, "id": "march"},
         {"prompt": "a person walks", "seconds": 1.0},
     ]
-    found = list(batch(written(folder / "jobs.jsonl", rows), "out", options=options(weights)))
-    assert [one.state for one in found] == ["made"] * 3
+    results = list(batch(write_jobs(folder / "jobs.jsonl", rows), "out", options=options(weights)))
+    assert [one.state for one in results] == ["made"] * 3
     walk, march, plain = records(folder / "out")
     clip = put_on_robot(io.load("march.npz"), robot, max_speed=2.0)
     back = load_clip("out/shard-000000/march.npz", robot)
@@ -68,7 +68,7 @@ def test_rows_become_joint_angles_with_their_figures(robot: Robot, weights: str,
 
 def test_what_a_row_does_not_say_the_job_says(robot: Robot, weights: str, folder: Path) -> None:
     """`--robot` is for every row but those with a skeleton; a filter asks for figures; a tar holds angles."""
-    jobs = written(
+    jobs = write_jobs(
         folder / "jobs.jsonl",
         [
             {"prompt": "a person walks", "seconds": 1.0, "id": "one"},
@@ -76,15 +76,15 @@ def test_what_a_row_does_not_say_the_job_says(robot: Robot, weights: str, folder
             {"prompt": "a person walks", "seconds": 1.0, "skeleton": "smpl22", "id": "person"},
         ],
     )
-    asked = options(weights, robot="tin.xml", format="webdataset", filter="top_speed > 1.1")
-    list(batch(jobs, "out", options=asked))
+    settings = options(weights, robot="tin.xml", format="webdataset", filter="top_speed > 1.1")
+    list(batch(jobs, "out", options=settings))
     one, slow, person = records(folder / "out")
     assert one["state"] == "made"
     assert one["top_speed"] > 1.1
     assert slow["state"] == "dropped"
     assert slow["slowed_seconds"] > 0
     assert "robot" not in person
-    assert [made.id for made in read_batch("out") if made.motion] == ["person"]
+    assert [entry.id for entry in read_batch("out") if entry.motion] == ["person"]
 
 
 def test_a_folder_of_recordings_needs_no_jobs(
@@ -99,10 +99,10 @@ def test_a_folder_of_recordings_needs_no_jobs(
     line += ["--weights", weights, "--workers", "1"]
     assert main(line) == 1
     assert "by their names" in capsys.readouterr().err
-    found = {one["id"]: one for one in records(folder / "out")}
-    assert found.keys() == {"more_two__too", "one", "three"}
-    assert "BVH" in found["three"]["why"]
-    assert [found[name]["limits_broken"] for name in ("one", "more_two__too")] == [0, 0]
+    entries = {one["id"]: one for one in records(folder / "out")}
+    assert entries.keys() == {"more_two__too", "one", "three"}
+    assert "BVH" in entries["three"]["why"]
+    assert [entries[name]["limits_broken"] for name in ("one", "more_two__too")] == [0, 0]
     place = folder / "out" / "shard-000000" / "one.csv"
     assert len(load_clip(place, robot)) == len(place.read_text().splitlines()) - 1 == 24
     capsys.readouterr()
@@ -145,8 +145,8 @@ def test_ways_are_in_the_robots_metres(row: dict[str, Any], robot: Robot, weight
         "path: {path: {points: [[0, 0], [0, 1.5]]}}\nsegments: [{text: a person walks, seconds: 3}]\n"
     )
     rows = [{**row, "robot": "tin.xml", "id": "robot"}, {**row, "id": "person"}]
-    found = list(batch(written(folder / "jobs.jsonl", rows), "out", options=options(weights)))
-    assert [one.state for one in found] == ["made"] * 2
+    results = list(batch(write_jobs(folder / "jobs.jsonl", rows), "out", options=options(weights)))
+    assert [one.state for one in results] == ["made"] * 2
     poses = load_clip("out/shard-000000/robot.npz", robot).qpos
     assert np.hypot(*(poses[-1, :2] - poses[0, :2])) == pytest.approx(1.5, abs=0.2)  # an untrained person shakes
     root = io.load("out/shard-000000/person.npz").root
@@ -154,7 +154,7 @@ def test_ways_are_in_the_robots_metres(row: dict[str, Any], robot: Robot, weight
 
 
 @pytest.mark.parametrize(
-    ("row", "said"),
+    ("row", "sentence"),
     [
         ({"prompt": "walks", "robot": "../tin.xml"}, "leads out"),
         ({"prompt": "walks", "robot": "none.xml"}, "no such file"),
@@ -169,15 +169,15 @@ def test_ways_are_in_the_robots_metres(row: dict[str, Any], robot: Robot, weight
     ],
     ids=str,
 )
-def test_rows_that_cannot_be_have_a_sentence(row: dict[str, Any], said: str, robot: Robot, folder: Path) -> None:
+def test_rows_that_cannot_be_have_a_sentence(row: dict[str, Any], sentence: str, robot: Robot, folder: Path) -> None:
     (folder / "dog.xml").write_text(models.on_legs(4))
-    with pytest.raises(MotionloomError, match=said) as caught:
+    with pytest.raises(MotionloomError, match=sentence) as caught:
         key(row)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "sentence"),
     [
         ({"format": "bvh"}, "the format is bvh"),
         ({"hands": "fist"}, "characters"),
@@ -187,15 +187,15 @@ def test_rows_that_cannot_be_have_a_sentence(row: dict[str, Any], said: str, rob
     ],
     ids=str,
 )
-def test_jobs_that_cannot_be_are_refused_before_any_work(wrong: dict[str, Any], said: str, robot: Robot) -> None:
+def test_jobs_that_cannot_be_are_refused_before_any_work(wrong: dict[str, Any], sentence: str, robot: Robot) -> None:
     settings: dict[str, Any] = {"robot": "tin.xml"}
-    with pytest.raises((MotionloomError, OSError), match=said):
+    with pytest.raises((MotionloomError, OSError), match=sentence):
         check_options(Options(**settings | wrong))
 
 
 def test_poses_are_not_joint_angles(weights: str, folder: Path) -> None:
     """A row without a robot fails where files hold joint angles, and says so."""
-    jobs = written(folder / "jobs.csv", [])
+    jobs = write_jobs(folder / "jobs.csv", [])
     jobs.write_text("prompt,seconds,robot,avoid_collisions\na person walks,1,,\n")
     list(batch(jobs, "out", options=options(weights, format="csv")))
     (one,) = records(folder / "out")

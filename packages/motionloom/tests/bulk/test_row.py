@@ -37,14 +37,14 @@ def test_the_id_changes_with_everything_a_row_asks(change: dict[str, Any]) -> No
 
 def test_the_id_changes_with_weights_settings_and_what_rows_do_not_say() -> None:
     row = {"prompt": "a person walks"}
-    found = [
+    keys = [
         key(row),
         key(row, common={**COMMON, "weights": "v"}),
         key(row, common={**COMMON, "steps": 12}),
         key(row, seconds=4.0),
         key(row, seed=1),
     ]
-    assert len(set(found)) == 5
+    assert len(set(keys)) == 5
 
 
 def test_the_id_does_not_change_with_how_the_same_is_said() -> None:
@@ -55,10 +55,10 @@ def test_the_id_does_not_change_with_how_the_same_is_said() -> None:
 def test_numbers_in_a_prompt_are_read_unless_they_are_left_literal() -> None:
     """The row is as long as they need, or as it says itself; the ids of prompts without numbers are what they were."""
     row = {"prompt": "a person walks 2 meters", "seed": 1}
-    asked = Sources(Path(), COMMON).ask(parse(json.dumps(row).encode()))
-    assert asked.timeline is not None
-    assert asked.text == "a person walks 2 meters"
-    assert asked.frames == round(20 * asked.timeline.seconds) < 100
+    order = Sources(Path(), COMMON).ask(parse(json.dumps(row).encode()))
+    assert order.timeline is not None
+    assert order.text == "a person walks 2 meters"
+    assert order.frames == round(20 * order.timeline.seconds) < 100
     assert Sources(Path(), COMMON).ask(parse(json.dumps(row | {"seconds": 4}).encode())).frames == 80
     assert Sources(Path(), COMMON, literal=True).ask(parse(json.dumps(row).encode())).timeline is None
     assert key(row) != key(row, literal=True)
@@ -77,19 +77,19 @@ def test_numbers_in_a_prompt_are_read_unless_they_are_left_literal() -> None:
 def test_what_rows_have_in_common_is_read_once(row: dict[str, Any], tmp_path: Path) -> None:
     """Forty thousand rows of one sentence take seconds, not minutes; so do those that name one damaged file."""
     (tmp_path / "damaged.yaml").write_text("segments:\n" + "- {text: a person walks}\n" * 50 + "- {text: 7}\n")
-    said = []
+    texts = []
 
     def ask(sources: Sources, seed: int) -> None:
         try:
-            said.append(sources.ask(parse(json.dumps({"seed": seed} | row).encode())).text)
+            texts.append(sources.ask(parse(json.dumps({"seed": seed} | row).encode())).text)
         except MotionloomError as error:
-            said.append(str(error))
+            texts.append(str(error))
 
     ask(Sources(tmp_path, COMMON), 0)  # what is imported and compiled once
     sources = Sources(tmp_path, COMMON)
     first = work(lambda: ask(sources, 0))
     assert work(lambda: ask(sources, 1)) < first / 2
-    assert said[0] == said[1] == said[2]
+    assert texts[0] == texts[1] == texts[2]
 
 
 def test_the_id_of_a_row_without_the_best_of_several_is_as_it_was() -> None:
@@ -103,11 +103,11 @@ def test_the_id_of_a_row_without_the_best_of_several_is_as_it_was() -> None:
 
 def test_the_id_changes_with_what_a_named_file_holds(folder: Path) -> None:
     row = {"prompt": "a person walks", "goal": "goal.json"}
-    found = set()
+    keys = set()
     for z in (1.0, 2.0, 1.0):
         (folder / "goal.json").write_text(json.dumps({"path": {"points": [[0, 0], [0, z]]}}))
-        found.add(key(row, folder))
-    assert len(found) == 2
+        keys.add(key(row, folder))
+    assert len(keys) == 2
 
 
 def test_the_id_changes_with_a_timeline_and_with_a_skeleton(folder: Path) -> None:

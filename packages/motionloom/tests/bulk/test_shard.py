@@ -24,7 +24,7 @@ from motionloom.bulk.metadata import Result, read_batch
 from motionloom.bulk.shard import CAREFUL, FATAL, Batch, Report, Task, make_shard
 from motionloom.errors import MotionloomError
 from motionloom.io import load
-from tests.bulk.rows import apart, options, positions, rows, written
+from tests.bulk.rows import apart, options, positions, rows, write_jobs
 
 OUT = Path("out")
 TIMELINE = "segments: [{text: a person walks, seconds: 1}, {text: a person sits, seconds: 1}]\n"
@@ -36,13 +36,13 @@ def ready(weights: str) -> Maker:
     return Maker(options(weights), folder=Path())
 
 
-def make(maker: Maker, found: list[dict[str, Any]], asked: Options | None = None, first: int = 0) -> Report:
+def make(maker: Maker, job: list[dict[str, Any]], settings: Options | None = None, first: int = 0) -> Report:
     """The rows as shard 0 of the folder ``out``."""
-    asked = asked or maker.options
-    maker.sources._cache.clear()
-    manifest = open_folder(OUT, asked, rows=len(found), shard_rows=max(len(found), 1))
-    batch = Batch(str(OUT), ".", manifest["weights"]["sha256"], manifest["duets"], asked)
-    return make_shard(Task(0, first, [json.dumps(row).encode() for row in found]), batch, maker)
+    settings = settings or maker.options
+    maker.sources._files.clear()
+    manifest = open_folder(OUT, settings, rows=len(job), shard_rows=max(len(job), 1))
+    batch = Batch(str(OUT), ".", manifest["weights"]["sha256"], manifest["duets"], settings)
+    return make_shard(Task(0, first, [json.dumps(row).encode() for row in job]), batch, maker)
 
 
 def results() -> list[Result]:
@@ -66,8 +66,8 @@ def test_what_is_written_is_read_back(ready: Maker, kind: str) -> None:
 
 
 def test_a_tar_is_as_webdataset_reads_it_and_the_same_bytes_again(ready: Maker) -> None:
-    asked = replace(ready.options, format="webdataset")
-    make(ready, [*rows(3), {"prompt": "a person sits", "id": "mine"}], asked)
+    settings = replace(ready.options, format="webdataset")
+    make(ready, [*rows(3), {"prompt": "a person sits", "id": "mine"}], settings)
     first = everything()
     with tarfile.open(OUT / "shard-000000.tar") as tar:
         names = tar.getnames()
@@ -76,7 +76,7 @@ def test_a_tar_is_as_webdataset_reads_it_and_the_same_bytes_again(ready: Maker) 
     assert (about["text"], about["seed"], about["id"]) == ("a person sits", 0, "mine")
     assert about["key"] != "mine"
     OUT.rename("before")
-    make(ready, [*rows(3), {"prompt": "a person sits", "id": "mine"}], asked)
+    make(ready, [*rows(3), {"prompt": "a person sits", "id": "mine"}], settings)
     assert everything() == first
 
 
@@ -92,21 +92,21 @@ def test_a_shard_that_is_there_is_not_made_again(ready: Maker, monkeypatch: pyte
 def test_only_what_is_missing_is_made_in_whatever_order_rows_come(ready: Maker, kind: str) -> None:
     if kind == "parquet":
         pytest.importorskip("pyarrow")
-    asked = replace(ready.options, format=kind)
-    make(ready, rows(4), asked)
+    settings = replace(ready.options, format=kind)
+    make(ready, rows(4), settings)
     four = positions(OUT)
-    report = make(ready, rows(6)[::-1], asked)
-    assert (report.counts, report.made) == ({"made": 6}, 2)
+    report = make(ready, rows(6)[::-1], settings)
+    assert (report.counts, report.new_rows) == ({"made": 6}, 2)
     six = positions(OUT)
     assert apart({key: six[key] for key in four}, four) == 0
     assert [one.about["seed"] for one in results()] == [5, 4, 3, 2, 1, 0]
-    report = make(ready, rows(2), asked)  # and what is no longer asked for goes
-    assert (report.counts, report.made, len(positions(OUT))) == ({"made": 2}, 0, 2)
+    report = make(ready, rows(2), settings)  # and what is no longer asked for goes
+    assert (report.counts, report.new_rows, len(positions(OUT))) == ({"made": 2}, 0, 2)
 
 
 def test_rows_that_cannot_be_are_listed_with_a_sentence_and_the_others_made(ready: Maker) -> None:
-    found = [{"prompt": ""}, *rows(3), {"prompt": "a", "seconds": 1e9}, {"prompt": "a", "goal": "absent.json"}]
-    report = make(ready, found)
+    job = [{"prompt": ""}, *rows(3), {"prompt": "a", "seconds": 1e9}, {"prompt": "a", "goal": "absent.json"}]
+    report = make(ready, job)
     assert report.counts == {"made": 3, "failed": 3}
     failed = [one for one in results() if one.state == "failed"]
     assert [one.row for one in failed] == [0, 4, 5]
@@ -123,24 +123,24 @@ def test_rows_that_nobody_can_make_as_they_are_written_are_not_tried_again(ready
             ({"prompt": "a", "goal": "absent.json"}, True),
         ]
     ):
-        found = [*rows(2), row]
-        make(ready, found)
+        job = [*rows(2), row]
+        make(ready, job)
         OUT.rename(f"out{number}")
-        jobs = Jobs.of(written(folder / "jobs.jsonl", found))
+        jobs = Jobs.of(write_jobs(folder / "jobs.jsonl", job))
         (item,) = _items(jobs, 3, Store(folder / f"out{number}", "npz"), (0, 1))
         assert isinstance(item, Task) == again
         if isinstance(item, Report):
-            assert (item.counts, item.made, len(item.problems)) == ({"made": 2, "failed": 1}, 0, 1)
+            assert (item.counts, item.new_rows, len(item.problems)) == ({"made": 2, "failed": 1}, 0, 1)
 
 
 def test_a_row_that_breaks_the_program_breaks_itself_alone(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """And is tried again, when it may go well; what is there already stays as it is."""
     finished = Maker._finished
 
-    def poisoned(self: Maker, asked: Any, *more: Any) -> Any:
-        if asked.seed == 2:
+    def poisoned(self: Maker, orders: Any, *more: Any) -> Any:
+        if orders.seed == 2:
             raise ZeroDivisionError("poison")
-        return finished(self, asked, *more)
+        return finished(self, orders, *more)
 
     with monkeypatch.context() as patch:
         patch.setattr(Maker, "_finished", poisoned)
@@ -156,11 +156,11 @@ def test_a_row_that_breaks_the_program_breaks_itself_alone(ready: Maker, monkeyp
 
 @pytest.mark.parametrize("seconds", ["1" + "0" * 400, "-1" + "0" * 400, "1e999", "1" + "0" * 4400])
 def test_a_number_of_very_many_digits_is_the_error_of_its_row(ready: Maker, seconds: str) -> None:
-    found = [json.dumps(row).encode() for row in rows(3)]
-    found[1] = b'{"prompt": "a person walks", "seconds": %s}' % seconds.encode()
+    lines = [json.dumps(row).encode() for row in rows(3)]
+    lines[1] = b'{"prompt": "a person walks", "seconds": %s}' % seconds.encode()
     open_folder(OUT, ready.options, rows=3, shard_rows=3)
-    made = make_shard(Task(0, 0, found), Batch(str(OUT), ".", "", {}, ready.options), ready)
-    assert made.counts == {"made": 2, "failed": 1}
+    report = make_shard(Task(0, 0, lines), Batch(str(OUT), ".", "", {}, ready.options), ready)
+    assert report.counts == {"made": 2, "failed": 1}
     assert results()[1].state == "failed"
     assert "OverflowError" not in results()[1].why
 
@@ -179,19 +179,21 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
 
     def before(place: Any, name: str, what: Any) -> None:
         old = getattr(place, name)
-        monkeypatch.setattr(place, name, lambda *given, **more: (poisoned(what(*given)), old(*given, **more))[1])
+        monkeypatch.setattr(
+            place, name, lambda *arguments, **more: (poisoned(what(*arguments)), old(*arguments, **more))[1]
+        )
 
     before(
         *{
             "parse": (row_module, "_columns", lambda raw: raw),
             "ask": (row_module.Sources, "_robot", lambda self, row: row.seed),
             "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
-            "add": (writers_module.Files, "add", lambda self, made, about: about["seed"]),
+            "add": (writers_module.Files, "add", lambda self, take, about: about["seed"]),
             "run": (maker_module, "run_each", lambda plans, *_: "99" if any(p.seconds == 0.95 for p in plans) else ""),
         }[at]
     )
-    found = [*rows(2), {"prompt": "a person walks", "seconds": 0.95, "seed": 99}, *rows(5)[3:]]
-    assert make(ready, found).counts == {"made": 4, "failed": 1}
+    job = [*rows(2), {"prompt": "a person walks", "seconds": 0.95, "seed": 99}, *rows(5)[3:]]
+    assert make(ready, job).counts == {"made": 4, "failed": 1}
     assert [(one.row, "ZeroDivisionError: poison" in one.why) for one in results() if one.state == "failed"] == [
         (2, True)
     ]
@@ -202,9 +204,9 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
 def test_a_shard_that_cannot_be_put_together_says_so_once(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """No process dies of it, and nobody asks for more memory."""
     monkeypatch.setattr(Store, "commit", lambda *_, **__: {}["nothing"])
-    with pytest.raises(MotionloomError, match=r"shard 0 cannot be put together.*KeyError") as said:
+    with pytest.raises(MotionloomError, match=r"shard 0 cannot be put together.*KeyError") as raised:
         make(ready, rows(3))
-    assert "memory" not in str(said.value)
+    assert "memory" not in str(raised.value)
     assert not list((OUT / ".work").iterdir())
 
 
@@ -217,11 +219,11 @@ def test_a_row_that_ends_its_process_every_time_is_found_out(ready: Maker, monke
     finished = Maker._finished
     tried: Counter[int] = Counter()
 
-    def deadly(self: Maker, asked: Any, *more: Any) -> Any:
-        tried[asked.seed] += 1
-        if asked.seed == 1:
+    def deadly(self: Maker, orders: Any, *more: Any) -> Any:
+        tried[orders.seed] += 1
+        if orders.seed == 1:
             raise Killed
-        return finished(self, asked, *more)
+        return finished(self, orders, *more)
 
     with monkeypatch.context() as patch:
         patch.setattr(Maker, "_finished", deadly)
@@ -243,24 +245,24 @@ def test_rows_that_were_made_before_the_one_that_ends_its_process_are_not_blamed
 
     finished = Maker._finished
 
-    def deadly(self: Maker, asked: Any, *more: Any) -> Any:
-        if asked.seed == 3:
+    def deadly(self: Maker, orders: Any, *more: Any) -> Any:
+        if orders.seed == 3:
             raise Killed
-        return finished(self, asked, *more)
+        return finished(self, orders, *more)
 
-    found = [{"prompt": "a person walks", "seconds": 1.0, "seed": seed} for seed in range(6)]
+    job = [{"prompt": "a person walks", "seconds": 1.0, "seed": seed} for seed in range(6)]
     monkeypatch.setattr(Maker, "_finished", deadly)
     for _ in range(CAREFUL + FATAL):
         with pytest.raises(Killed):
-            make(ready, found)
-    assert make(ready, found).counts == {"made": 5, "failed": 1}
+            make(ready, job)
+    assert make(ready, job).counts == {"made": 5, "failed": 1}
     assert [one.row for one in results() if one.state == "failed"] == [3]
 
 
 def test_the_same_row_twice_is_one_motion_and_an_id_names_one_row(ready: Maker) -> None:
     same = rows(1)[0]
-    found = [same, same, same | {"id": "a"}, rows(2)[1] | {"id": "a"}]
-    assert make(ready, found).counts == {"made": 2, "repeated": 1, "failed": 1}
+    job = [same, same, same | {"id": "a"}, rows(2)[1] | {"id": "a"}]
+    assert make(ready, job).counts == {"made": 2, "repeated": 1, "failed": 1}
     states = [(one.state, one.why) for one in results()]
     assert states[1] == ("repeated", "row 0 of the job is the same")
     assert states[3] == ("failed", "row 2 has this id")
@@ -275,14 +277,14 @@ def test_a_filter_drops_what_does_not_pass_and_says_what_it_measured(ready: Make
     assert make(ready, rows(6), replace(ready.options, filter=condition)).counts == {"made": 3, "dropped": 3}
     for one in results():
         assert (one.about["travel"] > travel[2]) == (one.state == "made") == (one.motion is not None)
-    assert make(ready, rows(6), replace(ready.options, filter=condition)).made == 0
+    assert make(ready, rows(6), replace(ready.options, filter=condition)).new_rows == 0
 
 
 @pytest.mark.parametrize("kind", ["npz", "webdataset"])
 def test_two_who_make_the_same_shard_keep_apart(ready: Maker, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """An actor whose driver died may go on for a while beside the one that took its place."""
-    asked = replace(ready.options, format=kind)
-    make(ready, rows(3), asked)
+    settings = replace(ready.options, format=kind)
+    make(ready, rows(3), settings)
     exact = everything()
     shutil.rmtree(OUT)
     commit, others = shard_module._Shard._commit, []
@@ -290,12 +292,12 @@ def test_two_who_make_the_same_shard_keep_apart(ready: Maker, kind: str, monkeyp
     def late(self: Any, data: Path | None, **more: Any) -> Report:
         if not others:
             others.append("begun")
-            others.append(make(ready, rows(3), asked))
+            others.append(make(ready, rows(3), settings))
         return commit(self, data, **more)
 
     monkeypatch.setattr(shard_module._Shard, "_commit", late)
     with pytest.raises(MotionloomError, match="cannot write to out"):
-        make(ready, rows(3), asked)
+        make(ready, rows(3), settings)
     assert others[1] == Report(0, 3, {"made": 3}, 3)
     assert everything() == exact
 
@@ -305,10 +307,10 @@ def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pyte
     before = everything()
     add = shard_module.writer
 
-    def full(*given: Any, **options: Any) -> Any:
-        made = add(*given, **options)
-        monkeypatch.setattr(made, "add", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
-        return made
+    def full(*arguments: Any, **options: Any) -> Any:
+        result = add(*arguments, **options)
+        monkeypatch.setattr(result, "add", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
+        return result
 
     with monkeypatch.context() as patch:
         patch.setattr(shard_module, "writer", full)
@@ -318,7 +320,7 @@ def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pyte
     after = everything()
     del after["manifest.json"]
     assert after == before
-    assert make(ready, rows(5)).made == 2
+    assert make(ready, rows(5)).new_rows == 2
 
 
 def flipped(data: bytes) -> bytes:
@@ -343,18 +345,18 @@ DAMAGES = {
 @pytest.mark.parametrize("kind", ["npz", "webdataset"])
 def test_what_is_damaged_is_found_and_made_anew(ready: Maker, kind: str, damage: str, folder: Path) -> None:
     """Of a folder of single files the one motion, of one large file, or where the record is at fault, all of them."""
-    asked, found = replace(ready.options, format=kind), rows(3)
-    make(ready, found, asked)
+    settings, job = replace(ready.options, format=kind), rows(3)
+    make(ready, job, settings)
     before = everything()
     data, record = Store(OUT, kind).data(0), OUT / "records/000000.jsonl"
     file = record if damage.startswith("record") else data if data.is_file() else next(data.iterdir())
     left = DAMAGES[damage](file.read_bytes())
     file.unlink() if left is None else file.write_bytes(left)
 
-    jobs = Jobs.of(written(folder / "jobs.jsonl", found))
+    jobs = Jobs.of(write_jobs(folder / "jobs.jsonl", job))
     assert [type(item) for item in _items(jobs, 3, Store(OUT, kind), (0, 1))] == [Task]
     assert Store(OUT, kind).damage(0) == [file]
-    assert make(ready, found, asked).made == (1 if file.parent == data else 3)
+    assert make(ready, job, settings).new_rows == (1 if file.parent == data else 3)
     assert everything() == before
     assert [type(item) for item in _items(jobs, 3, Store(OUT, kind), (0, 1))] == [Report]
 
@@ -365,11 +367,11 @@ def test_a_folder_of_before_there_were_hashes_goes_on(ready: Maker, folder: Path
     head, *lines = record.read_text().splitlines(keepends=True)
     old = {key: value for key, value in json.loads(head).items() if key not in ("sha256", "record")}
     record.write_text("".join([json.dumps(old) + "\n", *lines]))
-    jobs = Jobs.of(written(folder / "jobs.jsonl", rows(3)))
+    jobs = Jobs.of(write_jobs(folder / "jobs.jsonl", rows(3)))
     assert [type(item) for item in _items(jobs, 3, Store(OUT, "npz"), (0, 1))] == [Report]
     next(Store(OUT, "npz").data(0).iterdir()).unlink()
     assert [type(item) for item in _items(jobs, 3, Store(OUT, "npz"), (0, 1))] == [Task]
-    assert make(ready, rows(3)).made == 3
+    assert make(ready, rows(3)).new_rows == 3
 
 
 def test_goals_timelines_and_skeletons_are_made_and_measured(ready: Maker, folder: Path) -> None:
@@ -377,13 +379,13 @@ def test_goals_timelines_and_skeletons_are_made_and_measured(ready: Maker, folde
     goal = {"path": {"points": [[0, 0], [0, 0.5]]}}
     (folder / "goal.json").write_text(json.dumps(goal))
     taller = load(_someone_taller(folder))
-    found = [
+    job = [
         {"prompt": "a person walks", "seconds": 1, "goal": "goal.json"},
         {"prompt": "a person walks", "seconds": 1, "seed": 1, "goal": goal},
         {"timeline": "a.yaml", "seed": 4},
         {"prompt": "a person walks", "seconds": 1, "skeleton": "rig.npz"},
     ]
-    report = make(ready, found)
+    report = make(ready, job)
     assert report.counts == {"made": 4}
     control, _, long, rig = results()
     assert control.about["error"] is not None
@@ -395,7 +397,7 @@ def test_goals_timelines_and_skeletons_are_made_and_measured(ready: Maker, folde
     assert rig.motion is not None
     assert np.allclose(rig.motion.skeleton.offsets, taller.skeleton.offsets)
     (folder / "goal.json").write_text(json.dumps({"path": {"points": [[0, 0], [0, 0.4]]}}))
-    assert make(ready, found).made == 1  # only that of the goal that changed
+    assert make(ready, job).new_rows == 1  # only that of the goal that changed
 
 
 def _someone_taller(folder: Path) -> Path:
@@ -415,13 +417,13 @@ def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: P
 
     goal = {"path": {"points": [[0, 0], [0, 0.5]]}}
     (folder / "a.yaml").write_text(TIMELINE)
-    found = [
+    job = [
         {"prompt": "a person walks", "seconds": 1, "seed": 3},
         {"prompt": "a person walks", "seconds": 1, "seed": 3, "goal": goal},
         {"timeline": "a.yaml", "seed": 3},
         {"prompt": "turn left 90 degrees", "seed": 3},
     ]
-    make(ready, found)
+    make(ready, job)
     prior, read = ready.prior, read_goal(goal, frames=20, folder=folder)
     segments = [Segment("a person walks", 1.0, transition=0.5), Segment("a person sits", 1.0, transition=0.5)]
     single = [

@@ -22,8 +22,8 @@ OUT = Path("out")
 
 
 def make(weights: str, kind: str = "npz", *, count: int = 5, force: bool = False) -> None:
-    asked = options(weights, shard_rows=2, format=kind)
-    list(batch(rows(count), OUT, options=asked, where=Where(workers=1), force=force))
+    settings = options(weights, shard_rows=2, format=kind)
+    list(batch(rows(count), OUT, options=settings, where=Where(workers=1), force=force))
 
 
 def everything() -> dict[Path, bytes]:
@@ -89,10 +89,10 @@ def test_a_damaged_shard_is_read_by_nobody_and_left_out_of_no_table(
     with pytest.raises(MotionloomError, match=r"shard 1 of out is damaged; 'motionloom batch --verify out'"):
         list(read_batch(OUT, motions=False))
     (OUT / "records" / "000000.jsonl").unlink()
-    asked = options(weights, shard_rows=2)
+    settings = options(weights, shard_rows=2)
     with pytest.raises(MotionloomError, match="shard 1 of out is damaged"):  # which is another's to make
-        list(run(Jobs.of(rows(5)), OUT, options=asked, where=Where(1, (0, 2))))
-    list(run(Jobs.of(rows(5)), OUT, options=asked, where=Where(1, (1, 2))))
+        list(run(Jobs.of(rows(5)), OUT, options=settings, where=Where(1, (0, 2))))
+    list(run(Jobs.of(rows(5)), OUT, options=settings, where=Where(1, (1, 2))))
     assert [one.state for one in read_batch(OUT, motions=False)] == ["made"] * 5
     assert verify(OUT) == Verified(3, 3, 8, 0, ())
 
@@ -138,13 +138,13 @@ def test_a_folder_that_is_no_batch_or_that_somebody_works_in_is_not_verified(wei
 def test_counts_in_a_damaged_folder_are_not_counted_to(weights: str) -> None:
     """A manifest of before there were hashes may say any number of rows, and so may the table's note."""
     make(weights)
-    shown = [(one.row, one.state) for one in read_batch(OUT)]
+    states = [(one.row, one.state) for one in read_batch(OUT)]
     manifest = json.loads((OUT / "manifest.json").read_text())
     del manifest["sha256"]
     (OUT / "manifest.json").write_text(json.dumps(manifest | {"rows": 2**64}))
     table = json.loads((OUT / "records" / "table.json").read_text())
     (OUT / "records" / "table.json").write_text(json.dumps(table | {"shards": 10**18}))
-    assert [(one.row, one.state) for one in read_batch(OUT)] == shown
-    found = verify(OUT)
-    assert (found.shards, found.of) == (3, 2**63)
-    assert found.damaged[0] == OUT / "records" / "000003.jsonl"
+    assert [(one.row, one.state) for one in read_batch(OUT)] == states
+    report = verify(OUT)
+    assert (report.shards, report.of) == (3, 2**63)
+    assert report.damaged[0] == OUT / "records" / "000003.jsonl"

@@ -25,9 +25,9 @@ def knowing(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The file of a tiny prior around a walking person that says what it knows."""
     features = humanml.motion_to_features(person(2.0))
     std = np.full(263, 0.02, np.float32)
-    made = replace(tiny.prior(), mean=features.mean(0), std=std)
-    known = known_sentences(["a person walks", "a person turns left"], {"walk": 90.0, "turn left": 4.0}, made.text)
-    return str(save_prior(replace(made, known=known), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
+    prior = replace(tiny.prior(), mean=features.mean(0), std=std)
+    known = known_sentences(["a person walks", "a person turns left"], {"walk": 90.0, "turn left": 4.0}, prior.text)
+    return str(save_prior(replace(prior, known=known), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,7 @@ def zombie(knowing: str, tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(tiny.adapter(Prior.load(knowing)).save(tmp_path_factory.mktemp("adapters") / "zombie.safetensors"))
 
 
-def drawn(*words: str) -> np.ndarray:
+def positions_of(*words: str) -> np.ndarray:
     assert main([*words, "--steps", "2", "--out", "a.npz"]) == 0
     return io.load("a.npz").positions()
 
@@ -64,13 +64,15 @@ def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str) -> N
         ["edit", "clips/one.bvh", "a person turns", "--between", "0.5", "1.5"],
     )
     for line in lines:
-        plain = drawn(*line, "--weights", knowing)
-        changed = drawn(*line, "--weights", knowing, "--adapter", zombie)
+        plain = positions_of(*line, "--weights", knowing)
+        changed = positions_of(*line, "--weights", knowing, "--adapter", zombie)
         assert np.abs(plain - changed).max() > 1e-3
-        none = drawn(*line, "--weights", knowing, "--adapter", f"{zombie}:1", "--adapter", f"{zombie}:-1")
+        none = positions_of(*line, "--weights", knowing, "--adapter", f"{zombie}:1", "--adapter", f"{zombie}:-1")
         assert np.abs(plain - none).max() < 1e-2
-    half = drawn("compose", "t.yaml", "--weights", knowing)
-    whole = drawn("compose", "a person walks", "--seconds", "2", "--weights", knowing, "--adapter", f"{zombie}:0.5")
+    half = positions_of("compose", "t.yaml", "--weights", knowing)
+    whole = positions_of(
+        "compose", "a person walks", "--seconds", "2", "--weights", knowing, "--adapter", f"{zombie}:0.5"
+    )
     assert np.abs(half - whole).max() < 1e-3
 
 
@@ -80,9 +82,12 @@ def test_the_server_draws_with_adapters_as_generate_does(knowing: str, zombie: s
     with running(Path("project"), *line) as server:
         job = server.draw(task="generate", prompt="a person walks", seconds=2.0, seed=0, steps=2)
         Path("served.npz").write_bytes(server.ask("GET", f"/motions/{job['results'][0]['id']}.npz")[2])
-    changed = drawn("generate", "a person walks", "--seconds", "2", *line)
+    changed = positions_of("generate", "a person walks", "--seconds", "2", *line)
     assert np.abs(io.load("served.npz").positions() - changed).max() < 1e-3
-    assert np.abs(changed - drawn("generate", "a person walks", "--seconds", "2", "--weights", knowing)).max() > 2e-3
+    assert (
+        np.abs(changed - positions_of("generate", "a person walks", "--seconds", "2", "--weights", knowing)).max()
+        > 2e-3
+    )
 
 
 @pytest.mark.parametrize("command", ["serve", "studio", "mcp"])
@@ -107,9 +112,9 @@ def test_wrong_adapters_are_one_sentence(knowing: str, weights: str, zombie: str
 
 def test_actions_are_listed_with_their_seconds(knowing: str, weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["weights", knowing, "--actions"]) == 0
-    said = capsys.readouterr().out
-    assert "90.0 s  walk\n" in said
-    assert said.index("walk") < said.index("turn left")
+    output = capsys.readouterr().out
+    assert "90.0 s  walk\n" in output
+    assert output.index("walk") < output.index("turn left")
     assert main(["weights", knowing, "--actions", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["sentences"] == ["walks", "turns left"]
     assert main(["weights", weights, "--actions"]) == 2
@@ -124,12 +129,12 @@ def test_what_is_unknown_is_remarked_on(knowing: str, capsys: pytest.CaptureFixt
     monkeypatch.setattr(known, "SAME", 0.9999)
     line = ["--weights", knowing, "--steps", "1", "--seconds", "1", "--json"]
     assert main(["generate", "a person walks", *line]) == 0
-    said = capsys.readouterr()
-    assert (said.err, json.loads(said.out)["remarks"]) == ("", [])
+    output = capsys.readouterr()
+    assert (output.err, json.loads(output.out)["remarks"]) == ("", [])
     assert main(["generate", "a person turns right then jumps", "--as-one", *line]) == 0
-    said = capsys.readouterr()
-    assert "have seen nothing like 'turns right then jumps'; nearest: " in said.err
-    assert len(json.loads(said.out)["remarks"]) == 1
+    output = capsys.readouterr()
+    assert "have seen nothing like 'turns right then jumps'; nearest: " in output.err
+    assert len(json.loads(output.out)["remarks"]) == 1
 
 
 def test_actions_in_a_row_are_parted_unless_they_are_left_whole(
@@ -147,10 +152,10 @@ def test_actions_in_a_row_are_parted_unless_they_are_left_whole(
         "--json",
     ]
     assert main(line) == 0
-    said = capsys.readouterr()
-    assert "one after the other: 'a person walks' 4.0 s, 'a person sits down' 3.0 s; --as-one" in said.err
-    (made,) = json.loads(said.out)["motions"]
-    assert made["segments"] == [
+    output = capsys.readouterr()
+    assert "one after the other: 'a person walks' 4.0 s, 'a person sits down' 3.0 s; --as-one" in output.err
+    (motion,) = json.loads(output.out)["motions"]
+    assert motion["segments"] == [
         {"begin": 0.0, "end": 4.0, "text": "a person walks"},
         {"begin": 4.0, "end": 7.0, "text": "a person sits down"},
     ]

@@ -17,7 +17,7 @@ from motionloom.io.bvh_writer import save_bvh
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior
-from tests.bulk.rows import rows, written
+from tests.bulk.rows import rows, write_jobs
 from tests.cli.said import complaint
 from tests.io.motions import largest_distance
 from tests.recorded.tiny import adapter
@@ -30,7 +30,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     for name in ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT"):
         monkeypatch.delenv(name, raising=False)
-    written(tmp_path / "jobs.jsonl", rows(4))
+    write_jobs(tmp_path / "jobs.jsonl", rows(4))
     (tmp_path / "prompts.txt").write_text("a person walks\na person turns\n")
     return tmp_path
 
@@ -43,27 +43,29 @@ def test_variants_of_prompts_are_made_once(weights: str, capsys: pytest.CaptureF
     words = ("--prompts", "prompts.txt", "--variants", "2", "--seconds", "0.5", "--json")
     assert command(weights, *words) == 0
     assert json.loads(capsys.readouterr().out) == {"folder": "out", "tried": 4, "made": 4}
-    made = sorted(path.name for path in Path("out").rglob("*.npz"))
-    assert len(made) == 4
+    names = sorted(path.name for path in Path("out").rglob("*.npz"))
+    assert len(names) == 4
     assert command(weights, *words) == 0
     assert json.loads(capsys.readouterr().out) == {"folder": "out", "tried": 0, "made": 4}
-    assert sorted(path.name for path in Path("out").rglob("*.npz")) == made
+    assert sorted(path.name for path in Path("out").rglob("*.npz")) == names
 
 
 def test_hands_and_unit_are_in_the_files(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Files in centimetres hold a hundred times the numbers; a fist closes, and has no fingers to close on smpl22."""
     save_bvh(still(handed()), "hands.bvh")
     words = ("--prompts", "prompts.txt", "--seconds", "0.5", "--format", "bvh", "--skeleton", "hands.bvh")
-    made = {}
+    motions = {}
     for name, more in (("open", ()), ("fist", ("--hands", "fist", "--out-unit", "cm"))):
         assert (
             main(["batch", *words, *more, "--out", name, "--weights", weights, "--steps", "2", "--workers", "1"]) == 0
         )
         (path, *_) = sorted(Path(name).rglob("*.bvh"))
-        made[name] = read_bvh(path)
-    assert (made["open"].unit, made["fist"].unit) == (1.0, 0.01)
-    tip, wrist = (made["fist"].motion.skeleton.index(name) for name in ("leftHandMiddle4", "left_wrist"))
-    far = {k: np.linalg.norm(np.diff(f.motion.positions()[:, [tip, wrist]], axis=1), axis=-1) for k, f in made.items()}
+        motions[name] = read_bvh(path)
+    assert (motions["open"].unit, motions["fist"].unit) == (1.0, 0.01)
+    tip, wrist = (motions["fist"].motion.skeleton.index(name) for name in ("leftHandMiddle4", "left_wrist"))
+    far = {
+        k: np.linalg.norm(np.diff(f.motion.positions()[:, [tip, wrist]], axis=1), axis=-1) for k, f in motions.items()
+    }
     assert far["fist"].max() < 0.8 * far["open"].min()
     capsys.readouterr()
     assert command(weights, *words[:4], "--hands", "fist") == 1
@@ -79,11 +81,11 @@ def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, caps
         adapter(prior, seed=seed).save(f"{name}.safetensors")
     words = ("--prompts", "prompts.txt", "--seconds", "0.5", "--seed", "3")
     assert command(weights, *words, "--adapter", "a.safetensors:0.5") == 0
-    made = {path.name: io.load(path) for path in finished(Path("out"), "**/*.npz")}
+    motions = {path.name: io.load(path) for path in finished(Path("out"), "**/*.npz")}
     (motion,) = generate(
         adapt(prior, [(Path("a.safetensors"), 0.5)]), "a person walks", seconds=0.5, seed=3, steps=2, literal=True
     )
-    assert min(largest_distance(motion, one) for one in made.values()) < 3e-6
+    assert min(largest_distance(motion, one) for one in motions.values()) < 3e-6
     for other in ((), ("--adapter", "b.safetensors:0.5"), ("--adapter", "a.safetensors")):
         assert command(weights, *words, *other) == 2
         assert "other settings" in capsys.readouterr().err
@@ -100,19 +102,19 @@ def test_rows_of_a_shard_can_be_chosen_once(weights: str, capsys: pytest.Capture
 
 
 def test_failed_rows_are_reported_and_the_exit_code_says_so(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
-    written(Path("jobs.jsonl"), [*rows(2), {"prompt": "a", "seconds": 99}])
+    write_jobs(Path("jobs.jsonl"), [*rows(2), {"prompt": "a", "seconds": 99}])
     assert command(weights, "jobs.jsonl", "--filter", "travel < 0") == 1
-    said = capsys.readouterr()
-    assert said.err == "motionloom: row 2: 'seconds' must be above 0 and at most 60 seconds; got 99\n"
-    assert "2 were dropped by the filter, 1 failed" in said.out
+    output = capsys.readouterr()
+    assert output.err == "motionloom: row 2: 'seconds' must be above 0 and at most 60 seconds; got 99\n"
+    assert "2 were dropped by the filter, 1 failed" in output.out
 
 
 def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(weights, "jobs.jsonl", "--dry-run", "--json", "--filter", "travel >= 0") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found["rows"], found["sampled"], found["usable"], found["workers"]) == (4, 4, 1.0, 1)
-    assert found["hours"] == pytest.approx(4 * found["seconds_each"] / 3600)
-    assert 3e-6 < found["gigabytes"] < 1e-3  # some ten kB each
+    estimate = json.loads(capsys.readouterr().out)
+    assert (estimate["rows"], estimate["sampled"], estimate["usable"], estimate["workers"]) == (4, 4, 1.0, 1)
+    assert estimate["hours"] == pytest.approx(4 * estimate["seconds_each"] / 3600)
+    assert 3e-6 < estimate["gigabytes"] < 1e-3  # some ten kB each
     assert not Path("out").exists()
     assert command(weights, "jobs.jsonl", "--dry-run", "--shard", "0/4") == 0
     assert capsys.readouterr().out.startswith("4 motions: ")
@@ -155,11 +157,11 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
 
 
 def test_a_column_that_is_none_is_reported_before_the_work(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
-    written(Path("jobs.jsonl"), [{"prompt": "a", "sead": 3}])
+    write_jobs(Path("jobs.jsonl"), [{"prompt": "a", "sead": 3}])
     assert command(weights, "jobs.jsonl") == 2
-    said = complaint(capsys)
-    assert "the row has no 'sead' (did you mean 'seed'?); it has robot, " in said
-    assert " task, prompt, seconds, seed, " in said
+    line = complaint(capsys)
+    assert "the row has no 'sead' (did you mean 'seed'?); it has robot, " in line
+    assert " task, prompt, seconds, seed, " in line
     assert not Path("out").exists()
 
 

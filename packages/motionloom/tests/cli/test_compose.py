@@ -26,17 +26,17 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
+def call(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the command asked of the maker of motion, which walks 1 m a second along +Z and stops where it is told."""
-    seen: dict = {"stop": None, "problem": KeyboardInterrupt}
+    record: dict = {"stop": None, "problem": KeyboardInterrupt}
 
     def compose(prior, segments, *, sampling, start, path, foot_lock, progress):
-        seen.update(segments=segments, start=start, path=path, foot_lock=foot_lock)
-        seen.update(seed=sampling.seed, guidance=sampling.guidance, steps=sampling.steps)
+        record.update(segments=segments, start=start, path=path, foot_lock=foot_lock)
+        record.update(seed=sampling.seed, guidance=sampling.guidance, steps=sampling.steps)
         at = 0
         for number, segment in enumerate(segments):
-            if number == seen["stop"]:
-                raise seen["problem"]
+            if number == record["stop"]:
+                raise record["problem"]
             frames = round(segment.seconds * 20)
             root = np.zeros((frames, 3))
             root[:, 2] = np.arange(at, at + frames) / 20
@@ -45,37 +45,37 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
             yield Motion(SMPL22, 20.0, root, np.tile(IDENTITY, (frames, 22, 1)))
 
     monkeypatch.setattr(long, "compose", compose, raising=False)
-    return seen
+    return record
 
 
 def compose(weights: str, *words: str) -> int:
     return main(["compose", *words, "--weights", weights])
 
 
-def written() -> set[str]:
+def file_names() -> set[str]:
     return {path.name for path in Path().iterdir()}
 
 
-def test_prompts_become_segments_of_equal_length(weights, asked, capsys):
+def test_prompts_become_segments_of_equal_length(weights, call, capsys):
     assert compose(weights, "walk", "jump over something", "sit down", "--seconds", "2", "--out", "long.bvh") == 0
-    assert [(s.text, s.seconds, s.transition, s.goal) for s in asked["segments"]] == [
+    assert [(s.text, s.seconds, s.transition, s.goal) for s in call["segments"]] == [
         (text, 2.0, 1.0, None) for text in ("walk", "jump over something", "sit down")
     ]
-    assert (asked["seed"], asked["guidance"], asked["steps"], asked["foot_lock"]) == (0, 2.5, 24, True)
-    assert (len(io.load("long.bvh")), written()) == (120, {"long.bvh"})
-    said = capsys.readouterr().out.splitlines()
-    assert said[0] == "wrote long.bvh: 6.00 s, 120 frames"
-    assert [line.split(maxsplit=1) for line in said[1:]] == [
+    assert (call["seed"], call["guidance"], call["steps"], call["foot_lock"]) == (0, 2.5, 24, True)
+    assert (len(io.load("long.bvh")), file_names()) == (120, {"long.bvh"})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "wrote long.bvh: 6.00 s, 120 frames"
+    assert [line.split(maxsplit=1) for line in lines[1:]] == [
         ["0.00", "walk"],
         ["2.00", "jump over something"],
         ["4.00", "sit down"],
     ]
 
 
-def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, asked, capsys):
+def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, call, capsys):
     Path("three.yaml").write_text(THREE)
     assert compose(weights, "three.yaml", "--out", "a.npz", "--json") == 0
-    assert (asked["seed"], asked["guidance"], len(io.load("a.npz"))) == (4, 3, 160)
+    assert (call["seed"], call["guidance"], len(io.load("a.npz"))) == (4, 3, 160)
     about = json.loads(capsys.readouterr().out)
     assert [one["sentence"] for one in about.pop("happened")] == ["moves 7.9 m forward"]
     assert about == {
@@ -90,10 +90,10 @@ def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, aske
         "remarks": [],
     }
     assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--no-foot-lock", "--steps", "3") == 0
-    assert [asked[key] for key in ("seed", "guidance", "foot_lock", "steps")] == [0, 0, False, 3]
+    assert [call[key] for key in ("seed", "guidance", "foot_lock", "steps")] == [0, 0, False, 3]
 
 
-def test_several_files_at_another_rate_hold_the_whole_motion(weights, asked):
+def test_several_files_at_another_rate_hold_the_whole_motion(weights, call):
     Path("three.yaml").write_text(THREE)
     names = ["a.bvh", "a.npz", "a.glb"]
     assert compose(weights, "three.yaml", "--fps", "30", *[w for n in names for w in ("--out", n)]) == 0
@@ -103,56 +103,56 @@ def test_several_files_at_another_rate_hold_the_whole_motion(weights, asked):
         np.testing.assert_allclose(motion.root[:, 2], np.arange(239) / 30, atol=1e-5)
 
 
-def test_a_start_is_read_and_handed_on(weights, asked):
+def test_a_start_is_read_and_handed_on(weights, call):
     clip = Motion(SMPL22, 30.0, np.zeros((9, 3)), np.tile(IDENTITY, (9, 22, 1)))
     io.save(clip, "clip.bvh")
     Path("on.yml").write_text("start: clip.bvh\nsegments: [walk]\n")
     assert compose(weights, "on.yml") == 0
-    assert (len(asked["start"]), asked["start"].fps) == (9, 30)
+    assert (len(call["start"]), call["start"].fps) == (9, 30)
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "a.npz"])
-def test_an_interruption_leaves_what_was_finished(weights, asked, name, capsys):
-    asked["stop"] = 2
+def test_an_interruption_leaves_what_was_finished(weights, call, name, capsys):
+    call["stop"] = 2
     Path("three.yaml").write_text(THREE)
     assert compose(weights, "three.yaml", "--out", name, "--json") == 130
     assert len(io.load(name)) == 140
-    assert written() == {name, "three.yaml"}
-    said = capsys.readouterr()
-    assert said.err == f"motionloom: interrupted; what was finished is in {name}, 7.00 s of 8.00 s\n"
-    assert [row["text"] for row in json.loads(said.out)["segments"]] == ["walk", "jump"]
+    assert file_names() == {name, "three.yaml"}
+    output = capsys.readouterr()
+    assert output.err == f"motionloom: interrupted; what was finished is in {name}, 7.00 s of 8.00 s\n"
+    assert [row["text"] for row in json.loads(output.out)["segments"]] == ["walk", "jump"]
 
 
-def test_a_real_ctrl_c_between_two_pieces_is_such_an_interruption(weights, asked, ctrl_c):
+def test_a_real_ctrl_c_between_two_pieces_is_such_an_interruption(weights, call, ctrl_c):
     assert compose(weights, "walk", "jump", "--out", "a.bvh") == 130
     assert len(io.load("a.bvh")) == 100
 
 
-def test_with_nothing_finished_nothing_is_left(weights, asked, capsys):
-    asked["stop"] = 0
+def test_with_nothing_finished_nothing_is_left(weights, call, capsys):
+    call["stop"] = 0
     assert compose(weights, "walk", "jump", "--out", "a.bvh", "--out", "a.npz") == 130
-    asked["problem"] = MotionloomError("the goal is out of reach")
+    call["problem"] = MotionloomError("the goal is out of reach")
     assert compose(weights, "walk", "jump", "--out", "a.bvh") == 2
     assert capsys.readouterr().err == "motionloom: interrupted\nmotionloom: the goal is out of reach\n"
-    assert written() == set()
+    assert file_names() == set()
 
 
-def test_a_failure_in_between_says_where_the_finished_part_is(weights, asked, capsys):
-    asked.update(stop=1, problem=MotionloomError("the goal is out of reach"))
+def test_a_failure_in_between_says_where_the_finished_part_is(weights, call, capsys):
+    call.update(stop=1, problem=MotionloomError("the goal is out of reach"))
     assert compose(weights, "walk", "jump", "--out", "a.bvh") == 2
-    said = capsys.readouterr().err
-    assert said == "motionloom: the goal is out of reach (what was finished is in a.bvh, 5.00 s)\n"
+    errors = capsys.readouterr().err
+    assert errors == "motionloom: the goal is out of reach (what was finished is in a.bvh, 5.00 s)\n"
     assert len(io.load("a.bvh")) == 100
 
 
-def test_check_reads_and_makes_nothing(weights, asked, capsys):
+def test_check_reads_and_makes_nothing(weights, call, capsys):
     Path("three.yaml").write_text(THREE)
     assert main(["compose", "three.yaml", "--check", "--weights", "absent"]) == 0
     assert capsys.readouterr().out.splitlines()[0] == "3 segments, 8.00 s in all; nothing was made"
     assert main(["compose", "three.yaml", "--check", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == []
-    assert written() == {"three.yaml"}
-    assert "segments" not in asked
+    assert file_names() == {"three.yaml"}
+    assert "segments" not in call
 
 
 @pytest.mark.parametrize(
@@ -181,23 +181,23 @@ def test_check_reads_and_makes_nothing(weights, asked, capsys):
     ],
     ids=lambda value: " ".join(value)[:25] if isinstance(value, list) else "",
 )
-def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words, message, capsys):
+def test_mistakes_are_one_sentence_and_nothing_is_written(weights, call, words, message, capsys):
     Path("three.yaml").write_text(THREE)
     Path("bad.yaml").write_text("segments:\n- tekst: walk\n")
     Path("long.yaml").write_text("segments:\n" + "- {text: walk, seconds: 60}\n" * 2100)
-    before = written()
+    before = file_names()
     assert compose(weights, *words) == 2
     assert message in complaint(capsys)
-    assert (written(), "segments" in asked) == (before, False)
+    assert (file_names(), "segments" in call) == (before, False)
 
 
-def test_a_prompt_with_anything_in_it_is_one_line_of_the_terminal(weights, asked, capsys):
+def test_a_prompt_with_anything_in_it_is_one_line_of_the_terminal(weights, call, capsys):
     assert compose(weights, "walk \udcff\x1b[31m\nand on", "y" * 100) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[1:] == ["     0.00  walk \\udcff\\u001b[31m and on", "     5.00  " + "y" * 77 + "..."]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:] == ["     0.00  walk \\udcff\\u001b[31m and on", "     5.00  " + "y" * 77 + "..."]
 
 
-def test_a_long_list_is_cut_short(weights, asked, capsys):
+def test_a_long_list_is_cut_short(weights, call, capsys):
     assert compose(weights, *["walk"] * 50, "--seconds", "0.2") == 0
     assert capsys.readouterr().out.splitlines()[-1].strip() == "... and 10 more; --json lists all"
 

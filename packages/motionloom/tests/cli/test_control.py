@@ -29,7 +29,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list:
+def calls(monkeypatch: pytest.MonkeyPatch) -> list:
     """What the command asks of the task, which here only stands there, 1 cm beside its goals."""
     calls = []
 
@@ -53,7 +53,7 @@ def control(weights: str, *words: str) -> int:
     return main(["control", *words, "--weights", weights])
 
 
-def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_reach_the_task(weights: str, calls: list, capsys: pytest.CaptureFixture[str]) -> None:
     words = [
         "a person walks",
         "--goal",
@@ -68,7 +68,7 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
         "3",
     ]
     assert control(weights, *words, "--steps", "7", "--no-fit", "--no-foot-lock", "--out", "a.npz") == 0
-    call = asked[0]
+    call = calls[0]
     goal = call.pop("goal")
     assert call == {
         "prompt": "a person walks",
@@ -84,16 +84,16 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
     }
     assert len(goal) == 40
     assert goal.positions[39, 0, ::2].tolist() == [1, 1.2]
-    said = capsys.readouterr()
-    assert said.out.splitlines()[0] == "wrote a_0.npz: 1.0 cm from its goals, at most 43.0 cm"
-    assert said.err.count("head at 1.20 s is 0.43 m away from its goal") == 2
+    output = capsys.readouterr()
+    assert output.out.splitlines()[0] == "wrote a_0.npz: 1.0 cm from its goals, at most 43.0 cm"
+    assert output.err.count("head at 1.20 s is 0.43 m away from its goal") == 2
     assert len(io.load("a_1.npz")) == 40
 
 
-def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: str, asked: list) -> None:
+def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: str, calls: list) -> None:
     words = ["walk", "--follow", "left_wrist", "--follow", "head", "--from", "clip.bvh"]
     assert control(weights, *words) == 0
-    followed = asked[-1]["goal"]
+    followed = calls[-1]["goal"]
     assert followed.joints == ("head", "left_wrist")
     assert len(followed) == 30  # as long as the clip
     assert followed.start.x == pytest.approx(2)
@@ -101,27 +101,27 @@ def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: str, asked: l
     Path("head.json").write_text(head)
     assert control(weights, "walk", "--goal", "head.json", "--path", "line.svg", "--width", "1") == 2
     assert control(weights, "walk", "--goal", "head.json", "--path", "line.svg", "--seconds", "3") == 0
-    drawn = asked[-1]["goal"]
-    assert drawn.joints == ("pelvis", "head")
-    assert drawn.positions[59, 0, 2] == pytest.approx(1.2 * 3)
+    goal = calls[-1]["goal"]
+    assert goal.joints == ("pelvis", "head")
+    assert goal.positions[59, 0, 2] == pytest.approx(1.2 * 3)
 
 
-def test_a_drawing_named_on_the_line_may_be_a_link(weights: str, asked: list, folder: Path) -> None:
+def test_a_drawing_named_on_the_line_may_be_a_link(weights: str, calls: list, folder: Path) -> None:
     """Only files from strangers are kept in their folder."""
     (folder / "inner").mkdir()
     (folder / "inner" / "link.svg").symlink_to(folder / "line.svg")
     assert control(weights, "walk", "--path", "inner/link.svg", "--seconds", "3") == 0
-    assert asked[-1]["goal"].positions[59, 0, 2] == pytest.approx(1.2 * 3)
+    assert calls[-1]["goal"].positions[59, 0, 2] == pytest.approx(1.2 * 3)
 
 
-def test_a_path_elsewhere_moves_the_start_of_somebody_who_follows(weights: str, asked: list) -> None:
+def test_a_path_elsewhere_moves_the_start_of_somebody_who_follows(weights: str, calls: list) -> None:
     """The clip's person stands at x = 2, its hand 0.6 m further: in reach of a path at x = 2.3."""
     Path("goal.json").write_text(json.dumps({"path": {"points": [[2.3, 0]]}}))
     assert control(weights, "walk", "--goal", "goal.json", "--follow", "left_wrist", "--from", "clip.bvh") == 0
-    assert asked[-1]["goal"].start.x == 2.3
+    assert calls[-1]["goal"].start.x == 2.3
 
 
-def test_the_report_is_json_when_asked(weights: str, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_report_is_json_when_asked(weights: str, calls: list, capsys: pytest.CaptureFixture[str]) -> None:
     assert control(weights, "walk", "--goal", "goal.json", "--json", "--out", "a.npz", "--fps", "30") == 0
     about = json.loads(capsys.readouterr().out)
     assert [one.pop("happened")[0]["ends"] for one in about["motions"]] == ["standing"]
@@ -174,18 +174,18 @@ def test_a_motion_is_made_from_end_to_end(weights: str, capsys: pytest.CaptureFi
     ids=lambda words: " ".join(words),
 )
 def test_mistakes_are_one_sentence_and_nothing_is_written(
-    weights: str, asked: list, words: list[str], capsys: pytest.CaptureFixture[str]
+    weights: str, calls: list, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The path of the drawing contradicts that of the goal."""
     before = {path.name for path in Path().iterdir()}
     assert control(weights, *words) == 2
     complaint(capsys)
     assert {path.name for path in Path().iterdir()} == before
-    assert not asked
+    assert not calls
 
 
 def test_a_drawing_that_is_missing_is_named_with_its_option(
-    weights: str, asked: list, capsys: pytest.CaptureFixture[str]
+    weights: str, calls: list, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert control(weights, "walk", "--path", "absent.svg") == 2
     assert "--path: there is no file 'absent.svg'" in complaint(capsys)

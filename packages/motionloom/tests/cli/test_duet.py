@@ -43,18 +43,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def duet(files: Path, *words: str, weights: str = "tiny", block: str = "block") -> int:
     own = [str(files / word[1:]) if word.startswith("@") else word for word in words]
-    given = [] if "--pair-weights" in words else ["--pair-weights", str(files / f"{block}.safetensors")]
-    return main(["duet", *own, *given, "--weights", str(files / f"{weights}.safetensors"), "--steps", "2"])
+    block_words = [] if "--pair-weights" in words else ["--pair-weights", str(files / f"{block}.safetensors")]
+    return main(["duet", *own, *block_words, "--weights", str(files / f"{weights}.safetensors"), "--steps", "2"])
 
 
-def written() -> set[str]:
+def file_names() -> set[str]:
     return {path.name for path in Path().iterdir()}
 
 
 def test_both_people_are_in_one_scene_and_in_a_file_each_of_the_same_world(files: Path) -> None:
     outs = [word for name in ("d.glb", "a.npz", "b.npz") for word in ("--out", name)]
     assert duet(files, "two people walk", "--seconds", "0.6", "--no-foot-lock", "--seed", "2", *outs) == 0
-    assert written() == {"d.glb", "a.npz", "b.npz"}
+    assert file_names() == {"d.glb", "a.npz", "b.npz"}
     scene = io.load_scene("d.glb")
     assert [len(motion) for motion in scene] == [12, 12]
     for motion, name in zip(scene, "ab", strict=True):
@@ -66,7 +66,7 @@ def test_several_duets_are_numbered(files: Path, capsys: pytest.CaptureFixture[s
         duet(files, "a person walks :: a person turns", "--seconds", "0.5", "--count", "2", "--no-foot-lock", "--json")
         == 0
     )
-    assert written() == {"duet_0.glb", "duet_1.glb"}
+    assert file_names() == {"duet_0.glb", "duet_1.glb"}
     about = json.loads(capsys.readouterr().out)
     assert about["files"] == ["duet_0.glb", "duet_1.glb"]
     assert (about["duets"], about["seconds"]) == (2, 0.5)
@@ -75,10 +75,10 @@ def test_several_duets_are_numbered(files: Path, capsys: pytest.CaptureFixture[s
 def test_a_past_is_the_beginning_of_what_is_written(files: Path) -> None:
     assert duet(files, "--past", "@a.bvh", "@b.bvh", "--seconds", "0.4", "--out", "c.bvh", "--out", "d.bvh") == 0
     for old, new in (("a", "c"), ("b", "d")):
-        before, made = io.load(files / f"{old}.bvh"), io.load(f"{new}.bvh")
-        assert made.skeleton.names == before.skeleton.names
-        assert len(made) == len(before) + round(0.4 * before.fps)
-        np.testing.assert_allclose(made.frames(0, len(before)).positions(), before.positions(), atol=1e-4)
+        before, after = io.load(files / f"{old}.bvh"), io.load(f"{new}.bvh")
+        assert after.skeleton.names == before.skeleton.names
+        assert len(after) == len(before) + round(0.4 * before.fps)
+        np.testing.assert_allclose(after.frames(0, len(before)).positions(), before.positions(), atol=1e-4)
 
 
 def test_whoever_is_given_is_the_first(files: Path) -> None:
@@ -124,9 +124,9 @@ def test_how_the_words_are_read_is_said(
     files: Path, capsys: pytest.CaptureFixture[str], words: str, remark: str
 ) -> None:
     assert duet(files, words, "--seconds", "0.5", "--out", "d.glb") == 0
-    said = capsys.readouterr().err
-    assert remark in said
-    assert bool(remark) == ("read as" in said)
+    errors = capsys.readouterr().err
+    assert remark in errors
+    assert bool(remark) == ("read as" in errors)
 
 
 def test_words_that_no_pair_was_called_are_remarked_on(
@@ -140,8 +140,8 @@ def test_words_that_no_pair_was_called_are_remarked_on(
     assert duet(files, "two people dance salsa together", "--seconds", "0.5", "--out", "a.glb", block="dancers") == 0
     assert "of two people" not in capsys.readouterr().err
     assert duet(files, "two people fix a car", "--seconds", "0.5", "--out", "b.glb", block="dancers") == 0
-    said = capsys.readouterr().err
-    assert "of two people these weights have seen nothing like 'fix a car'; nearest: 'dance salsa together'" in said
+    errors = capsys.readouterr().err
+    assert "of two people these weights have seen nothing like 'fix a car'; nearest: 'dance salsa together'" in errors
 
 
 def test_a_timeline_is_one_duet_of_all_its_segments(files: Path) -> None:
@@ -165,25 +165,25 @@ LED = {
 def test_how_firmly_the_two_stay_together_changes_what_is_drawn(files: Path, name: str) -> None:
     """From one seed the second person goes elsewhere with 0 than with 1, which is what is done unless told."""
     Path("t.yaml").write_text("segments:\n  - {text: two people walk, seconds: 3.5}\n", encoding="utf-8")
-    made = []
+    motions = []
     for words in (("--pair-guidance", "0"), ("--pair-guidance", "1"), ()):
         assert duet(files, *LED[name], *words, "--no-foot-lock", "--out", "a.npz", "--out", "b.npz") == 0
-        made.append(io.load("b.npz").root)
-    free, firm, untold = made
+        motions.append(io.load("b.npz").root)
+    free, firm, untold = motions
     assert np.abs(free - firm).max() > 1e-2
     np.testing.assert_array_equal(firm, untold)
 
 
 def test_how_firmly_the_two_stay_together_is_asked_behind_a_past_too(files: Path, monkeypatch) -> None:
-    asked = []
+    calls = []
 
     def complete(*_, sampling: PairSampling, **__):
-        asked.append(sampling.pair_guidance)
+        calls.append(sampling.pair_guidance)
         return [walkers(1.0)]
 
     monkeypatch.setattr(pair, "complete_pair", complete)
     assert duet(files, "--past", "@a.bvh", "@b.bvh", "--pair-guidance", "0.25") == 0
-    assert asked == [0.25]
+    assert calls == [0.25]
 
 
 WRONG = {
@@ -218,10 +218,10 @@ def test_a_mistake_is_one_sentence_and_leaves_nothing_behind(
 ) -> None:
     words, message = WRONG[name]
     assert duet(files, *words) == 2
-    said = capsys.readouterr().err.strip()
-    assert message in said
-    assert len(said.splitlines()) == 1
-    assert written() == set()
+    errors = capsys.readouterr().err.strip()
+    assert message in errors
+    assert len(errors.splitlines()) == 1
+    assert file_names() == set()
 
 
 def test_one_past_is_too_few(files: Path) -> None:
@@ -233,7 +233,7 @@ def test_one_past_is_too_few(files: Path) -> None:
 def test_a_block_of_other_weights_is_refused(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert duet(files, "two people walk", weights="other") == 2
     assert "belongs to the weights" in capsys.readouterr().err
-    assert written() == set()
+    assert file_names() == set()
 
 
 LINES = {
@@ -250,11 +250,11 @@ def test_a_wrong_timeline_is_reported_with_its_line(files: Path, capsys: pytest.
     Path("t.yaml").write_text(text, encoding="utf-8")
     Path("a.bvh").write_bytes((files / "a.bvh").read_bytes())
     assert duet(files, "--timeline", "t.yaml") == 2
-    said = capsys.readouterr().err.strip()
-    assert "t.yaml" in said
-    assert place in said
-    assert len(said.splitlines()) == 1
-    assert written() == {"t.yaml", "a.bvh"}
+    errors = capsys.readouterr().err.strip()
+    assert "t.yaml" in errors
+    assert place in errors
+    assert len(errors.splitlines()) == 1
+    assert file_names() == {"t.yaml", "a.bvh"}
 
 
 def test_bodies_that_are_in_each_other_are_measured_and_told(
@@ -265,16 +265,16 @@ def test_bodies_that_are_in_each_other_are_measured_and_told(
     monkeypatch.setattr(pair, "generate_pair", lambda *_, **__: [(person, person), (person, aside)])
     words = "two people walk", "--count", "2", "--out", "d.glb"
     assert duet(files, *words, "--json") == 0
-    told = capsys.readouterr()
-    found = json.loads(told.out)
-    inside, apart = found["measures"]
+    output = capsys.readouterr()
+    report = json.loads(output.out)
+    inside, apart = report["measures"]
     assert inside["least_trunk_distance"] == 0
     assert inside["overlapping_frames"] == len(person)
     assert inside["deepest_overlap"] > 0.15
     assert apart["deepest_overlap"] == apart["overlapping_frames"] == 0
     assert apart["least_trunk_distance"] > 2
-    assert len(found["remarks"]) == 1
-    assert found["remarks"][0] == (
+    assert len(report["remarks"]) == 1
+    assert report["remarks"][0] == (
         f"duet 1: the two are in each other by {100 * inside['deepest_overlap']:.0f} cm in {len(person)} frames"
     )
-    assert found["remarks"][0] in told.err
+    assert report["remarks"][0] in output.err

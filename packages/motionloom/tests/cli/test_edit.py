@@ -27,7 +27,7 @@ def edit(weights: str, *words: str) -> int:
     return main(["edit", "clip.bvh", *words, "--weights", weights, "--steps", "1"])
 
 
-def written() -> set[str]:
+def file_names() -> set[str]:
     return {path.name for path in Path().iterdir()} - {"clip.bvh"}
 
 
@@ -42,7 +42,7 @@ def test_the_issues_line_is_understood() -> None:
 def test_several_files_hold_the_same_edit_in_the_clips_own_manner(weights: str) -> None:
     """Rate, unit and order of rotations are the clip's; frames outside of the stretch are too."""
     assert edit(weights, "turns", "--between", "0.5", "1.2", "--out", "a.bvh", "--out", "a.npz") == 0
-    assert written() == {"a.bvh", "a.npz"}
+    assert file_names() == {"a.bvh", "a.npz"}
     a, b, clip = io.load("a.bvh"), io.load("a.npz"), io.load("clip.bvh")
     assert (len(a), a.fps) == (60, pytest.approx(30, abs=1e-3))
     assert largest_distance(a, b) < 1e-3
@@ -55,7 +55,7 @@ def test_versions_are_numbered_and_told_as_json(weights: str, capsys: pytest.Cap
     assert edit(weights, "--loop", "--blend", "0.5", "--count", "2", "--seed", "7", "--out", "m.npz", "--json") == 0
     about = json.loads(capsys.readouterr().out)
     assert about["seeds"] == [7, 8]
-    assert set(about["files"]) == written() == {"m_0.npz", "m_1.npz"}
+    assert set(about["files"]) == file_names() == {"m_0.npz", "m_1.npz"}
 
 
 def test_rate_and_skeleton_of_the_files_can_be_chosen(weights: str) -> None:
@@ -65,8 +65,8 @@ def test_rate_and_skeleton_of_the_files_can_be_chosen(weights: str) -> None:
         )
         == 0
     )
-    made = io.load("m.npz")
-    assert (made.fps, made.skeleton.names[0]) == (60, "pelvis")
+    motion = io.load("m.npz")
+    assert (motion.fps, motion.skeleton.names[0]) == (60, "pelvis")
 
 
 def test_a_part_of_the_clip_can_be_edited_alone(weights: str) -> None:
@@ -104,14 +104,14 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
 ) -> None:
     assert edit(weights, *words) == 2
     complaint(capsys)
-    assert not written()
+    assert not file_names()
 
 
 @pytest.mark.parametrize("clip", ["absent.bvh", "clip.xyz", "."])
 def test_a_clip_that_cannot_be_read_is_reported(weights: str, clip: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["edit", clip, "walk", "--weights", weights]) == 2
     complaint(capsys)
-    assert not written()
+    assert not file_names()
 
 
 @pytest.mark.parametrize("words", [["walk on", "turn"], ["walk", "--bogus"], ["--between", "1"]])

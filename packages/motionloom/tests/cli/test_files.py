@@ -38,14 +38,14 @@ def walk() -> Motion:
     return motion
 
 
-def said(capsys: pytest.CaptureFixture[str]) -> str:
+def output_of(capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["again.bvh", "a.npz", "a.glb"])
 def test_export_keeps_the_motion(walk, name, capsys):
     assert main(["export", "walk.bvh", name]) == 0
-    assert "60 frames, 2.00 s at 30 frames per second, 22 joints" in said(capsys)
+    assert "60 frames, 2.00 s at 30 frames per second, 22 joints" in output_of(capsys)
     again = io.load(name)
     assert again.fps == 30
     assert largest_distance(walk, again) < 1e-4
@@ -128,7 +128,7 @@ def test_view_draws_beside_the_caller_and_says_where(walk, folder, capsys):
     (folder / "sub").mkdir()
     Path("walk.bvh").rename("sub/walk.bvh")
     assert main(["view", "sub/walk.bvh"]) == 0
-    assert said(capsys) == "wrote walk.png\n"
+    assert output_of(capsys) == "wrote walk.png\n"
     assert Path("walk.png").read_bytes().startswith(b"\x89PNG")
     assert main(["view", "sub/walk.bvh", "sub/walk.bvh", "--out", "two.gif", "--end", "0.2"]) == 0
     assert Path("two.gif").read_bytes().startswith(b"GIF8")
@@ -136,7 +136,7 @@ def test_view_draws_beside_the_caller_and_says_where(walk, folder, capsys):
 
 def test_info_tells_what_was_put_in(walk, capsys):
     assert main(["info", "walk.bvh", "--json"]) == 0
-    info = json.loads(said(capsys))
+    info = json.loads(output_of(capsys))
     assert (info["skeleton"], info["joints"], info["frames"], info["fps"], info["unit"]) == (
         "SMPL-22",
         22,
@@ -154,7 +154,7 @@ def test_info_tells_what_was_put_in(walk, capsys):
     assert info["happened"]["sentence"] == "moves 1.9 m forward"
     assert info["happened"]["counts"] == {}
     assert main(["info", "walk.bvh"]) == 0
-    text = said(capsys)
+    text = output_of(capsys)
     assert "60 frames, 2.00 s at 30 frames per second" in text
     assert "  happens   moves 1.9 m forward\n" in text
 
@@ -163,9 +163,9 @@ def test_info_of_what_is_no_person_tells_no_deeds(capsys):
     chain = Skeleton(("a", "b"), (-1, 0), np.ones((2, 3)))
     io.save(Motion(chain, 20, np.zeros((30, 3)), np.tile(IDENTITY, (30, 2, 1))), "chain.npz")
     assert main(["info", "chain.npz", "--json"]) == 0
-    assert json.loads(said(capsys))["happened"] is None
+    assert json.loads(output_of(capsys))["happened"] is None
     assert main(["info", "chain.npz"]) == 0
-    assert "happens" not in said(capsys)
+    assert "happens" not in output_of(capsys)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_info_of_what_is_no_person_tells_no_deeds(capsys):
 def test_info_sees_common_faults(walk, change, problem, capsys):
     io.save(change(walk), "bad.npz")
     assert main(["info", "bad.npz"]) == 0
-    assert problem in said(capsys)
+    assert problem in output_of(capsys)
 
 
 def flipped(motion: Motion) -> Motion:

@@ -23,13 +23,13 @@ def generate(weights: str, *words: str) -> int:
     return main(["generate", *words, "--weights", weights, "--steps", "2", "--seconds", "1"])
 
 
-def written() -> set[str]:
+def file_names() -> set[str]:
     return {path.name for path in Path().iterdir()}
 
 
 def test_several_files_hold_the_same_motion(weights: str) -> None:
     assert generate(weights, "a person walks", "--out", "a.bvh", "--out", "a.npz", "--seed", "3") == 0
-    assert written() == {"a.bvh", "a.npz"}
+    assert file_names() == {"a.bvh", "a.npz"}
     a, b = io.load("a.bvh"), io.load("a.npz")
     assert (len(a), a.fps) == (20, 20)
     assert largest_distance(a, b) < 1e-3
@@ -37,7 +37,7 @@ def test_several_files_hold_the_same_motion(weights: str) -> None:
 
 def test_the_default_file_is_a_bvh(weights: str) -> None:
     assert generate(weights, "a person walks") == 0
-    assert written() == {"motion.bvh"}
+    assert file_names() == {"motion.bvh"}
 
 
 def test_prompts_come_from_the_line_and_a_file(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,7 +62,7 @@ def test_prompts_come_from_the_line_and_a_file(weights: str, capsys: pytest.Capt
         f"a person {v}" for v in ("walks", "turns", "jumps") for _ in range(2)
     ]
     assert [m["seed"] for m in about["motions"]] == list(range(6))
-    assert {Path(f).name for f in about["files"]} == written() - {"prompts.txt"} == {f"m_{i}.npz" for i in range(6)}
+    assert {Path(f).name for f in about["files"]} == file_names() - {"prompts.txt"} == {f"m_{i}.npz" for i in range(6)}
 
 
 def test_the_rate_of_the_files_can_be_chosen(weights: str) -> None:
@@ -98,7 +98,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
     """The last one has ten thousand words."""
     assert generate(weights, *words) == 2
     complaint(capsys)
-    assert not written()
+    assert not file_names()
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
 def test_numbers_out_of_range_are_refused(weights: str, options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["generate", "walk", "--weights", weights, *options]) == 2
     complaint(capsys)
-    assert not written()
+    assert not file_names()
 
 
 def test_a_folder_that_may_not_be_written_is_reported_before_the_work(
@@ -118,7 +118,7 @@ def test_a_folder_that_may_not_be_written_is_reported_before_the_work(
     Path("locked").write_text("a file where a folder should be")
     assert generate(weights, "walk", "--out", "locked/a.bvh") == 2
     assert "locked" in capsys.readouterr().err
-    assert written() == {"locked"}
+    assert file_names() == {"locked"}
 
 
 def test_a_damaged_weight_file_is_reported(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -126,13 +126,13 @@ def test_a_damaged_weight_file_is_reported(weights: str, capsys: pytest.CaptureF
     Path("cut.safetensors").write_bytes(Path("cut.safetensors").read_bytes()[:-10])
     assert main(["generate", "walk", "--weights", "cut.safetensors"]) == 2
     complaint(capsys)
-    assert written() == {"cut.safetensors"}
+    assert file_names() == {"cut.safetensors"}
 
 
 def test_bytes_that_are_no_text_do_not_break_it(weights: str) -> None:
     """What a shell hands over for a byte that is not UTF-8."""
     assert generate(weights, "walk \udcff", "--out", "a.npz") == 0
-    assert written() == {"a.npz"}
+    assert file_names() == {"a.npz"}
 
 
 def test_the_best_of_several_is_kept(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -155,8 +155,8 @@ def test_numbers_in_the_words_are_goals(weights: str, capsys: pytest.CaptureFixt
     """What was read is said once and measured; the seed decides; `--literal` reads nothing."""
     for out in ("a.npz", "b.npz"):
         assert generate(weights, "turn left 90 degrees", "--json", "--out", out) == 0
-    output, said = capsys.readouterr()
-    assert "read as: a turn of 90 degrees to the left, 1 s" in said
+    output, errors = capsys.readouterr()
+    assert "read as: a turn of 90 degrees to the left, 1 s" in errors
     assert '"asked": 90.0' in output
     assert largest_distance(io.load("a.npz"), io.load("b.npz")) == 0
     assert generate(weights, "turn left 90 degrees", "--literal", "--out", "c.npz") == 0

@@ -24,8 +24,8 @@ def test_a_script_becomes_a_motion_and_a_picture(weights: str, tmp_path: Path, c
     outs = [str(tmp_path / name) for name in ("a.bvh", "b.npz", "c.png")]
     words = [part for out in outs for part in ("--out", out)]
     assert main(["live", str(script), "--weights", weights, "--steps", "2", "--fps", "30", "--json", *words]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["frames"], said["files"], said["calls"]) == (36, outs, 4)
+    report = json.loads(capsys.readouterr().out)
+    assert (report["frames"], report["files"], report["calls"]) == (36, outs, 4)
     assert (load(outs[0]).fps, len(load(outs[1]))) == (pytest.approx(30, abs=1e-3), 36)
 
 
@@ -33,8 +33,8 @@ def test_two_people_become_a_file_each_and_one_picture(weights: str, tmp_path: P
     script = tmp_path / "a.yaml"
     script.write_text("people: 2\n" + SCRIPT + "- {at: 0.3, person: 2, say: a person waves}\n")
     prior = Prior.load(weights)
-    made = block(prior).save(tmp_path / "block.safetensors")
-    common = ["live", str(script), "--weights", weights, "--pair-weights", str(made), "--steps", "2"]
+    path = block(prior).save(tmp_path / "block.safetensors")
+    common = ["live", str(script), "--weights", weights, "--pair-weights", str(path), "--steps", "2"]
     outs = [str(tmp_path / name) for name in ("a.bvh", "b.bvh", "c.png")]
     assert main([*common, "--json", *(word for out in outs for word in ("--out", out))]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == outs

@@ -78,8 +78,8 @@ def test_a_future_and_a_switch_loop_too(weights: str, predictor: str, words: tup
 @pytest.mark.parametrize("people", [1, 2])
 def test_a_session_of_a_script_loops_too(weights: str, people: int) -> None:
     Path("script.yaml").write_text(f"people: {people}{SCRIPT}")
-    made = block(Prior.load(weights)).save("block.safetensors")
-    line = ["live", "script.yaml", "--weights", weights, "--pair-weights", str(made), *TINY[:2], "--seed", "3"]
+    path = block(Prior.load(weights)).save("block.safetensors")
+    line = ["live", "script.yaml", "--weights", weights, "--pair-weights", str(path), *TINY[:2], "--seed", "3"]
     names = ("a.npz", "b.npz")[:people]
     for folder, options in (("plain", []), ("loop", ["--loop", "--blend", "0.5"])):
         Path(folder).mkdir()

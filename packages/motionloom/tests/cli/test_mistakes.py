@@ -26,11 +26,11 @@ def test_an_unknown_option_points_to_the_help_of_its_command(words, page, capsys
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    assert "unrecognized arguments" in said.err
-    assert said.err.endswith(f"see {page}\n")
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
+    assert "unrecognized arguments" in output.err
+    assert output.err.endswith(f"see {page}\n")
 
 
 @pytest.mark.parametrize("moment", ["while commands are read", "while one runs"])
@@ -46,9 +46,9 @@ def test_ctrl_c_is_one_line_and_130_at_any_moment(moment, monkeypatch, capsys):
 
 def test_no_command_at_all_lists_the_commands_on_stderr(capsys):
     assert main([]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert "generate" in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert "generate" in output.err
 
 
 @pytest.mark.parametrize(
@@ -86,8 +86,8 @@ def test_a_file_of_prompts_is_plain_text_of_a_sane_size(folder, content, message
 
 def test_marks_of_other_systems_are_no_part_of_a_prompt(folder):
     (folder / "prompts.txt").write_bytes("\ufeffa person walks\r\n\r\n a person jumps ".encode())
-    asked = parser().parse_args(["generate", "someone waves", "--from", "prompts.txt"])
-    assert generate._prompts(asked) == ["someone waves", "a person walks", "a person jumps"]
+    arguments = parser().parse_args(["generate", "someone waves", "--from", "prompts.txt"])
+    assert generate._prompts(arguments) == ["someone waves", "a person walks", "a person jumps"]
 
 
 def test_a_warning_is_one_line_without_a_place_in_the_source(monkeypatch, capsys):

@@ -39,7 +39,7 @@ def test_other_names_mean_the_same(weights: str, words: tuple[str, ...]) -> None
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "sentence"),
     [
         (["a", "person", "walks"], 'did you mean: motionloom generate "a person walks"'),
         (["a person walks"], 'did you mean: motionloom generate "a person walks"'),
@@ -50,19 +50,22 @@ def test_other_names_mean_the_same(weights: str, words: tuple[str, ...]) -> None
         (["export", "a.dae", "a.bvh"], "Blender turns it into a .glb"),
     ],
 )
-def test_what_is_meant_is_suggested(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_meant_is_suggested(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words) == 2
-    assert said in complaint(capsys)
+    assert sentence in complaint(capsys)
 
 
 @pytest.mark.parametrize(
-    ("option", "said"), [("--secnds", "did you mean --seconds?"), ("-s", "--seconds or --seed?"), ("--out-u", "--out")]
+    ("option", "sentence"),
+    [("--secnds", "did you mean --seconds?"), ("-s", "--seconds or --seed?"), ("--out-u", "--out")],
 )
-def test_options_are_not_abbreviated_but_suggested(option: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_are_not_abbreviated_but_suggested(
+    option: str, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["generate", "walk", option, "3"])
     assert ended.value.code == 2
-    assert said in capsys.readouterr().err
+    assert sentence in capsys.readouterr().err
 
 
 def test_files_are_not_written_over_silently(weights: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -54,9 +54,9 @@ def test_export_puts_a_walk_on_a_character() -> None:
 
 def test_export_writes_the_characters_own_mesh_into_a_usda() -> None:
     assert main(["export", "walk.bvh", "moving.usda", "--skeleton", "hero.glb"]) == 0
-    found = Path("moving.usda").read_text()
-    assert 'def Mesh "body_0"' in found
-    assert found.count("def Mesh") == 1
+    text = Path("moving.usda").read_text()
+    assert 'def Mesh "body_0"' in text
+    assert text.count("def Mesh") == 1
 
 
 def test_a_character_that_lies_at_rest_is_said(capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,8 +81,8 @@ def test_a_character_that_lies_at_rest_is_said(capsys: pytest.CaptureFixture[str
     ],
 )
 def test_commands_that_draw_write_the_character(weights: str, words: tuple[str, ...]) -> None:
-    made = [*words, "--weights", weights, *TINY, "--skeleton", "hero.glb", "--clip-name", "ours"]
-    assert main([*made, "--out", "out.glb"]) == 0
+    line = [*words, "--weights", weights, *TINY, "--skeleton", "hero.glb", "--clip-name", "ours"]
+    assert main([*line, "--out", "out.glb"]) == 0
     check("out.glb", "ours")
 
 
@@ -106,7 +106,7 @@ def test_the_character_itself_is_not_written_over(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "sentence"),
     [
         (("--root", "hips"), "--root goes with a --skeleton"),
         (("--replace",), "--replace goes with a --skeleton"),
@@ -117,19 +117,19 @@ def test_the_character_itself_is_not_written_over(capsys: pytest.CaptureFixture[
     ],
 )
 def test_what_does_not_go_together_is_refused(
-    words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+    words: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", "walk.bvh", "out.bvh", *words]) == 2
-    assert said in complaint(capsys)
+    assert sentence in complaint(capsys)
     assert not Path("out.bvh").exists()
 
 
 def test_info_lists_clips_and_clip_picks_one(capsys: pytest.CaptureFixture[str]) -> None:
     Hero().clip("wave", wave(20)).clip("run", wave(30)).write(Path("two.glb"))
     assert main(["info", "two.glb", "--clip", "run"]) == 0
-    said = capsys.readouterr().out
-    assert "1  wave, 0.63 s" in said
-    assert "30 frames" in said
+    output = capsys.readouterr().out
+    assert "1  wave, 0.63 s" in output
+    assert "30 frames" in output
     assert main(["export", "two.glb", "two.bvh"]) == 0
     assert "2 clips" in complaint(capsys)
 
@@ -173,15 +173,15 @@ def test_the_same_three_in_a_bvh() -> None:
     skeleton = Skeleton(("base", *SMPL22.names), (-1, *(p + 1 for p in SMPL22.parents)), offsets)
     turns = np.tile([1.0, 0, 0, 0], (1, 23, 1))
     save_bvh(Motion(skeleton, 30.0, np.zeros((1, 3)), turns), "rooted.bvh")
-    found = {}
+    places = {}
     for mode in ("motion", "hips", "in-place"):
         assert main(["export", "walk.bvh", "out.bvh", "--skeleton", "rooted.bvh", "--root", mode]) == 0
-        found[mode] = io.load("out.bvh").positions()[:, :2]
-    np.testing.assert_allclose(found["motion"][:, 1], found["hips"][:, 1], atol=1e-5)
-    np.testing.assert_allclose(found["motion"][:, 0, 1], 0, atol=2e-3)
-    np.testing.assert_allclose(np.ptp(found["hips"][:, 0], axis=0), 0, atol=1e-5)
-    assert np.ptp(found["motion"][:, 0, 2]) > 0.5
-    assert np.ptp(found["in-place"][:, 1, 2]) < 1e-5
+        places[mode] = io.load("out.bvh").positions()[:, :2]
+    np.testing.assert_allclose(places["motion"][:, 1], places["hips"][:, 1], atol=1e-5)
+    np.testing.assert_allclose(places["motion"][:, 0, 1], 0, atol=2e-3)
+    np.testing.assert_allclose(np.ptp(places["hips"][:, 0], axis=0), 0, atol=1e-5)
+    assert np.ptp(places["motion"][:, 0, 2]) > 0.5
+    assert np.ptp(places["in-place"][:, 1, 2]) < 1e-5
 
 
 def test_toe_tips_of_a_bvh_skeleton_stay_out_of_the_floor() -> None:
@@ -239,7 +239,7 @@ def test_generate_writes_all_its_motions_into_one_file(weights: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "sentence"),
     [
         (("walk.bvh", "walk.bvh", "--out", "out.bvh"), "2 motions go into one file as animations of a character"),
         (("walk.bvh",), "one file to write is needed"),
@@ -247,10 +247,10 @@ def test_generate_writes_all_its_motions_into_one_file(weights: str) -> None:
     ],
 )
 def test_clips_that_cannot_be_are_refused(
-    words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+    words: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", *words]) == 2
-    assert said in complaint(capsys)
+    assert sentence in complaint(capsys)
     assert not list(Path().glob("out*"))
 
 
@@ -309,7 +309,7 @@ def test_two_people_keep_their_places_to_each_other() -> None:
     target = skeletons.Target("there.glb", load_character("there.glb").skeleton, character=load_character("there.glb"))
     one = person(2.0, 30.0)
     other = replace(one, root=np.array([0.0, 0.0, 1.5]) + one.root)
-    first, second = target.put_together([one, other])
+    first, second = target.retarget_all([one, other])
     np.testing.assert_allclose((second.root - first.root)[:, [0, 2]], np.tile([1.5, 0.0], (len(one), 1)), atol=1e-6)
 
 
@@ -330,21 +330,21 @@ def test_a_vrm_is_also_written_as_the_glb_that_it_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "sentence"),
     [
         (("walk.bvh", "moving.glb", "--skeleton", "hero.glb", "--clip", "wave"), "--clip-name names the one"),
         (("hero.glb", "wave.bvh", "--clip", "wawe"), "did you mean 'wave'?"),
         (("walk.bvh", "moving.glb", "--skeleton", "hero.gltf"), "give a name that ends in .gltf"),
     ],
 )
-def test_what_is_mixed_up_is_said(words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_mixed_up_is_said(words: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Also that a .gltf's character does not go lost in a .glb of a mannequin."""
     hero = Hero()
     uri = "data:application/octet-stream;base64," + base64.b64encode(bytes(hero.data)).decode()
     content = hero.json | {"buffers": [{"byteLength": len(hero.data), "uri": uri}]}
     Path("hero.gltf").write_text(json.dumps(content))
     assert main(["export", *words]) == 2
-    assert said in complaint(capsys)
+    assert sentence in complaint(capsys)
     assert not Path("moving.glb").exists()
 
 

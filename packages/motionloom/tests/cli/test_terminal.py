@@ -48,8 +48,8 @@ def lines(command: tuple[str, ...], hostile: str) -> Iterator[list[str]]:
             yield [*command, "x", action.option_strings[-1], hostile]
 
 
-def shows_nothing_hostile(said: str) -> bool:
-    return all(letter.isprintable() or letter in "\n\t" for letter in said)
+def shows_nothing_hostile(text: str) -> bool:
+    return all(letter.isprintable() or letter in "\n\t" for letter in text)
 
 
 @pytest.fixture(autouse=True)

@@ -23,12 +23,12 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one sentence on stderr; nothing is written."""
     before = sorted(Path().rglob("*"))
     assert main(list(words)) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    assert "Traceback" not in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
+    assert "Traceback" not in output.err
     assert sorted(Path().rglob("*")) == before
-    return said.err
+    return output.err
 
 
 def test_damaged_blocks_are_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,8 +45,8 @@ def test_all_kinds_of_shipped_weights_are_listed_and_found_by_name(
         "shipped_predictors": {"two": save_predictor(tiny_predictor.predictor(), "2.safetensors")},
         "blocks": {"three": block(tiny.prior()).save("3.safetensors")},
     }
-    for function, found in files.items():
-        monkeypatch.setattr(f"motionloom.cli.weights.{function}", lambda found=found: found)
+    for function, paths in files.items():
+        monkeypatch.setattr(f"motionloom.cli.weights.{function}", lambda paths=paths: paths)
     assert main(["weights", "--json"]) == 0
     listed = {about["name"]: about["kind"] for about in json.loads(capsys.readouterr().out)}
     assert listed == {"one": "prior", "two": "predictor", "three": "two-person block"}
@@ -61,8 +61,8 @@ def test_all_kinds_of_shipped_weights_are_listed_and_found_by_name(
 def test_a_card_is_printed_and_shipped_weights_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     save_prior(tiny.prior(), "tiny.safetensors")
     assert main(["weights", "tiny.safetensors"]) == 0
-    said = capsys.readouterr().out
-    assert all(word in said for word in ("tiny", "do what you like", "random numbers", "minilm", "263", "cosine"))
+    output = capsys.readouterr().out
+    assert all(word in output for word in ("tiny", "do what you like", "random numbers", "minilm", "263", "cosine"))
     assert main(["weights", "--json"]) == 0
     assert isinstance(json.loads(capsys.readouterr().out), list)
 

@@ -59,8 +59,8 @@ def line(name: str, files: Path) -> list[str]:
 @pytest.mark.parametrize("skeleton", [(), ("--skeleton", "mixamo")], ids=["own", "mixamo"])
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_bvh_is_in_the_unit_and_at_the_rate_that_are_asked(name: str, skeleton: tuple[str, ...], files: Path) -> None:
-    made = [*line(name, files), "--out", "out.bvh", "--out-unit", "cm", "--fps", "24", *skeleton]
-    assert main(made) == 0
+    words = [*line(name, files), "--out", "out.bvh", "--out-unit", "cm", "--fps", "24", *skeleton]
+    assert main(words) == 0
     raw = read_bvh("out.bvh", unit=1.0).motion
     assert 30 < raw.skeleton.bone_lengths().max() < 60  # a shin, in centimetres
     assert raw.fps == pytest.approx(24, rel=1e-4)

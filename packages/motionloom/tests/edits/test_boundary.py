@@ -36,14 +36,14 @@ def test_a_difference_fades_as_the_polynomial_with_its_value_and_slope_that_ends
 def test_rotations_go_on_with_the_angle_and_the_angular_velocity_that_are_known(step: int) -> None:
     """About one axis the angle behind the boundary is the sampled one and the cubic through the difference."""
     angles, known = 0.02 * np.arange(30.0) ** 1.5, 1.0 - 0.03 * np.arange(30.0)
-    made, given = (rot.rotvec_to_quat(a[:, None, None] * [0.0, 1.0, 0.0]) for a in (angles, known))
+    sampled, past = (rot.rotvec_to_quat(a[:, None, None] * [0.0, 1.0, 0.0]) for a in (angles, known))
     border, frames = 14, 8
-    result = match_rotations(made, given, border, step, frames)
-    found = np.unwrap(rot.quat_to_rotvec(result)[:, 0, 1])
+    result = match_rotations(sampled, past, border, step, frames)
+    angle = np.unwrap(rot.quat_to_rotvec(result)[:, 0, 1])
     lack = known - angles
     slope = lack[border] - lack[border - step]
     added = BPoly.from_derivatives([0, frames + 1], [[lack[border], slope], [0, 0]])(np.arange(1, frames + 1))
     at = border + step * np.arange(1, frames + 1)
-    np.testing.assert_allclose(found[at], angles[at] + added, atol=1e-9)
+    np.testing.assert_allclose(angle[at], angles[at] + added, atol=1e-9)
     others = np.setdiff1d(np.arange(30), at)
-    assert np.array_equal(result[others], made[others])
+    assert np.array_equal(result[others], sampled[others])

@@ -33,7 +33,7 @@ def standing(frames: int = 100) -> Motion:
     return replace(motion, root=motion.root - [0, lowest, 0])
 
 
-def asked(motion: Motion, joint: int, frames: slice | list[int], places: np.ndarray) -> Goal:
+def goal_for(motion: Motion, joint: int, frames: slice | list[int], places: np.ndarray) -> Goal:
     goal = Goal.nothing(len(motion))
     goal.positions[frames, joint], goal.mask[frames, joint] = places, True
     return goal
@@ -60,32 +60,32 @@ def test_a_circle_of_the_wrist_is_met_to_a_millimetre_on_constant_bones_and_stil
     motion = standing()
     time = np.arange(100) / 20
     circle = np.stack([-0.2 + 0.15 * np.cos(2 * time), 1.2 + 0.15 * np.sin(2 * time), 0.35 + 0 * time], axis=-1)
-    goal = asked(motion, WRIST, slice(None), circle)
-    made = fit(motion, goal)
-    assert off(made, goal).max() < 0.001
-    np.testing.assert_allclose(lengths(made), lengths(motion), atol=1e-9)
+    goal = goal_for(motion, WRIST, slice(None), circle)
+    fitted = fit(motion, goal)
+    assert off(fitted, goal).max() < 0.001
+    np.testing.assert_allclose(lengths(fitted), lengths(motion), atol=1e-9)
     feet = [7, 8, 10, 11]
-    np.testing.assert_allclose(made.positions()[:, feet], motion.positions()[:, feet], atol=0.003)
+    np.testing.assert_allclose(fitted.positions()[:, feet], motion.positions()[:, feet], atol=0.003)
 
 
 def test_keyframes_are_met_smoothly_and_frames_far_away_stay_exactly() -> None:
     """20 cm within a stretch of 60 frames: no frame's acceleration is more than a quarter of what a spike has."""
     motion = standing(200)
     place = motion.positions()[60, WRIST] + [0.1, 0.15, 0.05]
-    goal = asked(motion, WRIST, [60], place)
-    made = fit(motion, goal)
-    assert off(made, goal).max() < 0.001
-    change = np.linalg.norm(np.diff((made.positions() - motion.positions())[:, WRIST], n=2, axis=0), axis=-1)
+    goal = goal_for(motion, WRIST, [60], place)
+    fitted = fit(motion, goal)
+    assert off(fitted, goal).max() < 0.001
+    change = np.linalg.norm(np.diff((fitted.positions() - motion.positions())[:, WRIST], n=2, axis=0), axis=-1)
     assert change.max() < 0.25 * 0.19
     far = np.r_[0 : 60 - ROUND, 61 + ROUND : 200]
-    np.testing.assert_array_equal(made.rotations[far], motion.rotations[far])
-    np.testing.assert_array_equal(made.root[far], motion.root[far])
+    np.testing.assert_array_equal(fitted.rotations[far], motion.rotations[far])
+    np.testing.assert_array_equal(fitted.root[far], motion.root[far])
 
 
 def test_a_quarter_turned_world_gives_the_quarter_turned_motion() -> None:
     motion = standing(60)
     place = GroundPose(2.0, -1.0, np.pi / 2)
-    goal = asked(motion, WRIST, [30], motion.positions()[30, WRIST] + [0.1, 0.2, 0.0])
+    goal = goal_for(motion, WRIST, [30], motion.positions()[30, WRIST] + [0.1, 0.2, 0.0])
     turn = rot.rotvec_to_quat(np.array([0.0, np.pi / 2, 0.0]))
     rotations = motion.rotations.copy()
     rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
@@ -98,17 +98,17 @@ def test_the_mirror_image_is_fitted_to_the_mirror_image() -> None:
     """To 6 mm: the person's own left and right bones differ by millimetres, and the other hand is asked."""
     motion = standing(60)
     place = motion.positions()[30, WRIST] + [0.1, 0.2, 0.0]
-    made = fit(motion, asked(motion, WRIST, [30], place)).mirror().positions()
-    other = fit(motion.mirror(), asked(motion, SMPL22.index("left_wrist"), [30], place * [-1, 1, 1])).positions()
-    np.testing.assert_allclose(made, other, atol=0.006)
+    mirrored = fit(motion, goal_for(motion, WRIST, [30], place)).mirror().positions()
+    other = fit(motion.mirror(), goal_for(motion, SMPL22.index("left_wrist"), [30], place * [-1, 1, 1])).positions()
+    np.testing.assert_allclose(mirrored, other, atol=0.006)
 
 
 def test_out_of_reach_the_arm_points_there_and_the_body_stays() -> None:
     motion = standing(60)
-    goal = asked(motion, WRIST, slice(25, 35), np.array([-0.2, 5.0, 0.0]))
-    made = fit(motion, goal)
-    places = made.positions()
-    np.testing.assert_allclose(lengths(made), lengths(motion), atol=1e-9)
+    goal = goal_for(motion, WRIST, slice(25, 35), np.array([-0.2, 5.0, 0.0]))
+    fitted = fit(motion, goal)
+    places = fitted.positions()
+    np.testing.assert_allclose(lengths(fitted), lengths(motion), atol=1e-9)
     shoulder, wrist = places[30, SMPL22.index("right_shoulder")], places[30, WRIST]
     assert wrist[1] - shoulder[1] > 0.45
     assert np.abs(places - motion.positions())[:, [0, 7, 8]].max() < 0.06
@@ -119,9 +119,9 @@ def test_knees_and_elbows_do_not_turn_over() -> None:
     motion = standing(60)
     shoulder = motion.positions()[30, SMPL22.index("right_shoulder")]
     for way in ([-0.6, 0.0, 0.0], [0.0, 0.1, -0.5], [0.1, 0.0, 0.1]):
-        made = fit(motion, asked(motion, WRIST, [30], shoulder + way))
-        pose = fitting._Pose(made.root, made.rotations, np.zeros((60, fitting._COLUMNS)))
-        assert fitting._bends(*pose.seen()).min() > -0.01
+        fitted = fit(motion, goal_for(motion, WRIST, [30], shoulder + way))
+        pose = fitting._Pose(fitted.root, fitted.rotations, np.zeros((60, fitting._COLUMNS)))
+        assert fitting._bends(*pose.places_and_world()).min() > -0.01
 
 
 def walking(frames: int = 100) -> Motion:
@@ -146,10 +146,10 @@ def test_a_shifted_path_is_met_and_standing_feet_still_stand() -> None:
     goal = Goal.nothing(100)
     goal.positions[:, 0] = motion.root + np.stack([0.3 * np.arange(100) / 99, *np.zeros((2, 100))], axis=-1)
     goal.mask[:, 0, [0, 2]] = True
-    made = fit(motion, goal)
-    assert off(made, goal).max() < 0.001
+    fitted = fit(motion, goal)
+    assert off(fitted, goal).max() < 0.001
     standing_frames = ((np.arange(99) % 20) > 1) & ((np.arange(99) % 20) < 8)
-    slid = np.linalg.norm(np.diff(made.positions()[:, 7][:, [0, 2]], axis=0), axis=-1)[standing_frames]
+    slid = np.linalg.norm(np.diff(fitted.positions()[:, 7][:, [0, 2]], axis=0), axis=-1)[standing_frames]
     before = np.linalg.norm(np.diff(motion.positions()[:, 7][:, [0, 2]], axis=0), axis=-1)[standing_frames]
     assert slid.max() < before.max() + 0.003
 
@@ -159,14 +159,14 @@ def test_derivatives_are_those_of_finite_differences() -> None:
     motion = standing(2)
     change = RNG.normal(size=(2, fitting._COLUMNS))
     pose = fitting._Pose(motion.root, motion.rotations, change)
-    places, world = pose.seen()
+    places, world = pose.places_and_world()
     joints = tuple(range(22))
-    found = pose.jacobian(joints, places, pose.axes(world))
+    jacobian = pose.jacobian(joints, places, pose.axes(world))
     for column in range(fitting._COLUMNS):
         step = np.zeros_like(change)
         step[:, column] = 1e-5
-        ends = [replace(pose, change=change + sign * step).seen()[0] for sign in (1, -1)]
-        np.testing.assert_allclose(found[..., column], (ends[0] - ends[1]) / 2e-5, atol=1e-7)
+        ends = [replace(pose, change=change + sign * step).places_and_world()[0] for sign in (1, -1)]
+        np.testing.assert_allclose(jacobian[..., column], (ends[0] - ends[1]) / 2e-5, atol=1e-7)
 
 
 @pytest.mark.parametrize(("frames", "before", "after"), [(7, True, False), (8, False, True), (2, False, False)])
@@ -181,8 +181,8 @@ def test_the_banded_solution_is_that_of_the_whole_matrix(frames: int, before: bo
     whole = np.kron(np.eye(frames) + fitting.SLOW**2 * second.T @ second, np.eye(n))
     for f in range(frames):
         whole[f * n : f * n + n, f * n : f * n + n] += blocks[f]
-    found = fitting._banded(blocks, right, fitting._stiffness(frames, before, after))
-    np.testing.assert_allclose(found.ravel(), np.linalg.solve(whole, right.ravel()), rtol=1e-6)
+    solution = fitting._banded(blocks, right, fitting._stiffness(frames, before, after))
+    np.testing.assert_allclose(solution.ravel(), np.linalg.solve(whole, right.ravel()), rtol=1e-6)
 
 
 def test_what_cannot_be_fitted_is_said() -> None:

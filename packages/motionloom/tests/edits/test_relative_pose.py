@@ -21,7 +21,7 @@ from tests.recorded import tiny
 from tests.tasks.two_people import block as block_of
 
 FRAMES = 100
-SAID = ["a person walks", "a person turns left"]
+PROMPTS = ["a person walks", "a person turns left"]
 BESIDE = np.array([[1.0, 0.0, 0.0, 0.0], [-0.8, 0.6, 0.3, 1.0]])
 
 
@@ -35,7 +35,7 @@ def block(prior: Prior) -> PairBlock:
     return block_of(prior)
 
 
-class Told:
+class Recorder:
     """A network that always says that two people stand to each other as in `BESIDE`."""
 
     def __init__(self, net: PairSession) -> None:
@@ -56,25 +56,25 @@ def drifting(prior: Prior) -> np.ndarray:
     return features * (prior.std > 0) + np.where(prior.std > 0, 0.0, prior.mean)
 
 
-def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> tuple[np.ndarray, np.ndarray, Told]:
+def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> tuple[np.ndarray, np.ndarray, Recorder]:
     """Ways (2, frames, 4) in the world before and after."""
     net, spread = block.net(prior), np.where(prior.std > 0, prior.std, np.float32(1))
-    told, code, before = Told(net), net.places, drifting(prior)
+    recorder, code, before = Recorder(net), net.places, drifting(prior)
     denoised = join(code.encode(BESIDE), (before - prior.mean) / spread)
-    made = places.guided(
+    moved = places.guided(
         prior,
-        told,
-        net.bind(prior.condition(SAID)),
+        recorder,
+        net.bind(prior.condition(PROMPTS)),
         state=denoised,
         denoised=denoised,
         level=25,
         weight=weight,  # type: ignore
     )
-    assert np.array_equal(made[:, 0], denoised[:, 0])
-    after = made[:, 1:] * spread + prior.mean
+    assert np.array_equal(moved[:, 0], denoised[:, 0])
+    after = moved[:, 1:] * spread + prior.mean
     np.testing.assert_allclose(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
     ways = [two.compose(BESIDE[:, None], two.along(one)) for one in (before, after)]
-    return ways[0], ways[1], told
+    return ways[0], ways[1], recorder
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.0], ids=["led", "free"])
@@ -115,13 +115,13 @@ def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
     np.testing.assert_allclose(turned[0], -turned[1], rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("given", [0, 1])
-def test_nobody_given_is_moved_and_the_other_goes_the_whole_way(prior: Prior, block: PairBlock, given: int) -> None:
-    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [given == 0, given == 1]))
-    np.testing.assert_allclose(after[given], before[given], rtol=0, atol=1e-5)
+@pytest.mark.parametrize("person", [0, 1])
+def test_nobody_given_is_moved_and_the_other_goes_the_whole_way(prior: Prior, block: PairBlock, person: int) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [person == 0, person == 1]))
+    np.testing.assert_allclose(after[person], before[person], rtol=0, atol=1e-5)
     expected = relative(BESIDE[0], BESIDE[1])
     np.testing.assert_allclose(relative(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
-    assert np.linalg.norm((after[1 - given] - before[1 - given])[80, 2:]) > 0.3
+    assert np.linalg.norm((after[1 - person] - before[1 - person])[80, 2:]) > 0.3
 
 
 def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> None:
@@ -131,8 +131,8 @@ def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> Non
 
 
 def test_the_network_is_shown_crops_that_begin_at_the_anchors(prior: Prior, block: PairBlock) -> None:
-    _, _, told = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
-    [(x, lengths)] = told.shown
+    _, _, recorder = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
+    [(x, lengths)] = recorder.shown
     motion = (drifting(prior) - prior.mean) / np.where(prior.std > 0, prior.std, np.float32(1))
     assert lengths.tolist() == [60, 60, 20, 20]
     np.testing.assert_allclose(x[:2, 1:], motion[:, 40:100], atol=1e-5)
@@ -162,36 +162,36 @@ def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
 
 def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
     net, shared = block.net(prior), {"steps": 3, "bodies": False}
-    one, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], **shared)
-    other, _ = pair_features(prior, net, SAID[::-1], 70, seeds=[2, 1], **shared)
-    free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], pair_guidance=0.0, **shared)
+    one, _ = pair_features(prior, net, PROMPTS, 70, seeds=[1, 2], **shared)
+    other, _ = pair_features(prior, net, PROMPTS[::-1], 70, seeds=[2, 1], **shared)
+    free, _ = pair_features(prior, net, PROMPTS, 70, seeds=[1, 2], pair_guidance=0.0, **shared)
     np.testing.assert_allclose(one[0], np.flip(other[0], 0), rtol=0, atol=1e-3)
     assert np.abs(one - free).max() > 1e-3
-    many, _ = pair_features(prior, net, SAID * 2, 70, seeds=[1, 2, 3, 4], **shared)
+    many, _ = pair_features(prior, net, PROMPTS * 2, 70, seeds=[1, 2, 3, 4], **shared)
     np.testing.assert_allclose(many[0], one[0], rtol=0, atol=1e-3)
 
 
 def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
     net, first = block.net(prior), drifting(prior)[:, :20]
     observed = known_state(net, PairMotion(first[None], BESIDE[None]), 90)
-    made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], edits=PairEdits(observed), steps=2)
-    np.testing.assert_allclose(made[0, :, :20], first, rtol=0, atol=1e-5)
+    pair, _ = pair_features(prior, net, PROMPTS, 90, seeds=[1, 2], edits=PairEdits(observed), steps=2)
+    np.testing.assert_allclose(pair[0, :, :20], first, rtol=0, atol=1e-5)
 
 
 def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
     fresh = block_of(prior, fresh=True)
-    made = [
-        generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, foot_lock=False, pair_guidance=w)[0]
+    pairs = [
+        generate_pair(prior, fresh, PROMPTS[0], seconds=4, steps=2, foot_lock=False, pair_guidance=w)[0]
         for w in (0.0, 1.0)
     ]
-    for free, held in zip(*made, strict=True):
+    for free, held in zip(*pairs, strict=True):
         assert np.array_equal(free.positions(), held.positions())
 
 
 # What is asked, and who is led
 
 
-class Asked(Told):
+class Questioner(Recorder):
     """Keeps everything that it is shown."""
 
     def __call__(self, x: np.ndarray, level, bound) -> np.ndarray:
@@ -203,42 +203,44 @@ def test_every_question_is_of_its_own_pair_at_its_own_level_and_given_the_noised
     prior: Prior, block: PairBlock
 ) -> None:
     """Two pairs, with anchors at frames 40 and 80, and at 80."""
-    net, said = block.net(prior), [*SAID, "a person jumps", "a person sits down"]
-    bound, told = net.bind(prior.condition(said)), Asked(net)
+    net, prompts = block.net(prior), [*PROMPTS, "a person jumps", "a person sits down"]
+    bound, recorder = net.bind(prior.condition(prompts)), Questioner(net)
     drift, spread = drifting(prior), np.where(prior.std > 0, prior.std, np.float32(1))
     denoised = join(net.places.encode(BESIDE)[[0, 1, 0, 1]], ((drift - prior.mean) / spread)[[0, 1, 0, 1]])
     state = normal(denoised.shape, 2)
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 40], [False] * 4)
     level = np.array([7, 7, 30, 30])
-    made = places.guided(prior, told, bound, state=state, denoised=denoised, level=level, weight=1.0)  # type: ignore
-    asked = [(row, frame) for frame in (40, 80) for row in (0, 1)] + [(2, 80), (3, 80)]
-    assert np.asarray(told.level).tolist() == [7, 7, 7, 7, 30, 30]
-    assert told.bound.lengths.tolist() == [min(60, FRAMES - frame) for _, frame in asked]
+    moved = places.guided(prior, recorder, bound, state=state, denoised=denoised, level=level, weight=1.0)  # type: ignore
+    questions = [(row, frame) for frame in (40, 80) for row in (0, 1)] + [(2, 80), (3, 80)]
+    assert np.asarray(recorder.level).tolist() == [7, 7, 7, 7, 30, 30]
+    assert recorder.bound.lengths.tolist() == [min(60, FRAMES - frame) for _, frame in questions]
     ways = two.compose(BESIDE[:, None], two.along(drift))
-    for number, (row, frame) in enumerate(asked):
+    for number, (row, frame) in enumerate(questions):
         length, own = min(60, FRAMES - frame), int(level[row])
         np.testing.assert_allclose(
-            told.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length], atol=1e-5
+            recorder.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length], atol=1e-5
         )
-        assert np.array_equal(told.bound.text[number], bound.text[row])
+        assert np.array_equal(recorder.bound.text[number], bound.text[row])
         there = relative(ways[row % 2, frame], ways[1 - row % 2, frame])  # the other, as seen from there
         signal, noise = prior.schedule.at(own)
-        np.testing.assert_allclose(told.state[number, 0, :4], signal * there + noise * places.noise[number], atol=1e-5)
+        np.testing.assert_allclose(
+            recorder.state[number, 0, :4], signal * there + noise * places.noise[number], atol=1e-5
+        )
     # what is asked of the one pair changes nothing of the other
-    for pair, (begin, kept) in enumerate(((0, slice(0, 4)), (40, slice(4, 6)))):
+    for pair, (begin, share) in enumerate(((0, slice(0, 4)), (40, slice(4, 6)))):
         rows = slice(2 * pair, 2 * pair + 2)
         alone = Places.of([[1, 2], [3, 4]][pair], FRAMES, [begin], [False] * 2)
-        assert np.array_equal(alone.noise, places.noise[kept])
+        assert np.array_equal(alone.noise, places.noise[share])
         one = alone.guided(
             prior,
-            Told(net),
-            net.bind(prior.condition(said[rows])),
+            Recorder(net),
+            net.bind(prior.condition(prompts[rows])),
             state=state[rows],
             denoised=denoised[rows],  # type: ignore
             level=level[rows],
             weight=1.0,
         )
-        np.testing.assert_allclose(made[rows], one, rtol=0, atol=1e-5)
+        np.testing.assert_allclose(moved[rows], one, rtol=0, atol=1e-5)
     assert np.unique(places.noise).size == places.noise.size  # nothing is drawn twice
 
 
@@ -247,16 +249,16 @@ def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) 
     drift, spread = drifting(prior), np.where(prior.std > 0, prior.std, np.float32(1))
     denoised = join(net.places.encode(BESIDE)[[0, 1, 0, 1]], ((drift - prior.mean) / spread)[[0, 1, 0, 1]])
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 0], [True, False, False, True])
-    made = places.guided(
+    guided = places.guided(
         prior,
-        Told(net),
-        net.bind(prior.condition(SAID * 2)),
+        Recorder(net),
+        net.bind(prior.condition(PROMPTS * 2)),
         state=denoised,
         denoised=denoised,
         level=25,
         weight=1.0,  # type: ignore
     )
-    moved = np.abs(made - denoised).max((1, 2))
+    moved = np.abs(guided - denoised).max((1, 2))
     assert moved[[0, 3]].max() < 1e-5
     assert moved[[1, 2]].min() > 0.1
 
@@ -284,14 +286,16 @@ def test_anchors_stand_evenly_up_to_twenty_frames_before_the_end(
 
 def leads(
     prior: Prior, block: PairBlock, mask: np.ndarray, frozen=(False, False)
-) -> tuple[np.ndarray, np.ndarray, Told]:
+) -> tuple[np.ndarray, np.ndarray, Recorder]:
     """An estimate before and after the guidance, where ``mask`` (2, 1 + frames) says what is known."""
     net, spread = block.net(prior), np.where(prior.std > 0, prior.std, np.float32(1))
-    told = Told(net)
+    recorder = Recorder(net)
     denoised = join(net.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
     known = np.broadcast_to(mask[..., None], (denoised.shape))
-    lead = relative_pose_guidance(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, frozen=frozen)  # type: ignore
-    return denoised, lead(denoised, denoised, 25), told
+    lead = relative_pose_guidance(
+        prior, recorder, net.bind(prior.condition(PROMPTS)), seeds=[1, 2], mask=known, frozen=frozen
+    )  # type: ignore
+    return denoised, lead(denoised, denoised, 25), recorder
 
 
 Spans: TypeAlias = tuple[tuple[int, int], ...]
@@ -318,8 +322,8 @@ def test_anchors_begin_two_seconds_behind_the_common_beginning_and_known_numbers
     for row, some in enumerate(spans):
         for first, last in some:
             mask[row, first:last] = True
-    before, after, told = leads(prior, block, mask)
-    assert [one.tolist() for _, one in told.shown] == ([lengths] if lengths else [])
+    before, after, recorder = leads(prior, block, mask)
+    assert [one.tolist() for _, one in recorder.shown] == ([lengths] if lengths else [])
     assert np.array_equal(after[mask], before[mask])
     assert [bool((row > 0.01).any()) for row in np.abs(after - before)] == moves
 
@@ -335,6 +339,6 @@ def test_whom_others_move_is_not_led(prior: Prior, block: PairBlock, away: int) 
 
 def test_places_of_the_world_lead_nobody(prior: Prior, block: PairBlock) -> None:
     of_world = replace(block, config=replace(block.config, places=PUBLISHED_CODE))
-    before, after, told = leads(prior, of_world, np.zeros((2, FRAMES + 1), dtype=np.bool_))
+    before, after, recorder = leads(prior, of_world, np.zeros((2, FRAMES + 1), dtype=np.bool_))
     assert np.array_equal(before, after)
-    assert not told.shown
+    assert not recorder.shown

@@ -162,9 +162,9 @@ def test_the_displacements_stay_those_of_the_places(prior: Prior) -> None:
     goal = asking(60, 0, {40: (1.0, 0.0, 2.0)})
     changed = toward(goal, prior)(row, 25)
     before, after = ((part * prior.std + prior.mean).astype(np.float64) for part in (row, changed))
-    shown = humanml.displacements(after) - humanml.displacements(before)
-    said = (after - before)[:-1, 193:259].reshape(-1, 22, 3)
-    np.testing.assert_allclose(said, shown, atol=1e-5)
+    steps = humanml.displacements(after) - humanml.displacements(before)
+    velocities = (after - before)[:-1, 193:259].reshape(-1, 22, 3)
+    np.testing.assert_allclose(velocities, steps, atol=1e-5)
 
 
 def test_what_is_out_of_reach_moves_limbs_by_less_than_a_metre(prior: Prior) -> None:

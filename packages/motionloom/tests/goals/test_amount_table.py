@@ -14,8 +14,8 @@ ROWS = tomllib.loads((Path(__file__).parent / "amounts.toml").read_text(encoding
 def read(text: str) -> dict[str, object]:
     """What is read of one action, as the table writes it."""
     amount, seconds = read_amount(text), read_seconds(text)
-    found: dict[str, object] = {} if seconds is None else {"seconds": seconds}
-    return found | ({} if amount is None else _row(amount))
+    options: dict[str, object] = {} if seconds is None else {"seconds": seconds}
+    return options | ({} if amount is None else _row(amount))
 
 
 def _row(amount: Amount) -> dict[str, object]:
@@ -26,20 +26,20 @@ def _row(amount: Amount) -> dict[str, object]:
     return {amount.kind: round(amount.size, 2), "toward": amount.direction}
 
 
-def right(text: str, asked: dict[str, object]) -> bool:
+def right(text: str, row: dict[str, object]) -> bool:
     """Whether what is read of a text is what the table says."""
-    found = read(text)
-    wanted = {key: value for key, value in asked.items() if key not in ("text", "either", "nothing")}
-    if asked.get("either"):
-        found = {key: abs(value) if isinstance(value, float) else value for key, value in found.items()}
-    if "steps" in wanted and "toward" not in wanted:
-        wanted["toward"] = "forward"
-    return found == wanted
+    reading = read(text)
+    expected = {key: value for key, value in row.items() if key not in ("text", "either", "nothing")}
+    if row.get("either"):
+        reading = {key: abs(value) if isinstance(value, float) else value for key, value in reading.items()}
+    if "steps" in expected and "toward" not in expected:
+        expected["toward"] = "forward"
+    return reading == expected
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row["text"] for row in ROWS])
 def test_amounts_are_read(row: dict) -> None:
-    asked = row.get("parts", [row])
+    rows = row.get("parts", [row])
     parts = split_actions(row["text"])
-    assert len(parts) == len(asked)
-    assert all(right(part.text, one) for part, one in zip(parts, asked, strict=True)), [read(p.text) for p in parts]
+    assert len(parts) == len(rows)
+    assert all(right(part.text, one) for part, one in zip(parts, rows, strict=True)), [read(p.text) for p in parts]

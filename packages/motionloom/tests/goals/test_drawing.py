@@ -162,12 +162,12 @@ def test_any_bytes_are_a_sentence(tmp_path: Path, data: bytes) -> None:
         read_drawing(tmp_path / "d.svg")
 
 
-@pytest.mark.parametrize("said", ["rotate(1){}x", "rotate(1){}(", "rotate{}x", "rotate(1 {} x)"])
-def test_a_transform_with_very_many_blanks_takes_no_endless_time(draw, said: str) -> None:
+@pytest.mark.parametrize("transform", ["rotate(1){}x", "rotate(1){}(", "rotate{}x", "rotate(1 {} x)"])
+def test_a_transform_with_very_many_blanks_takes_no_endless_time(draw, transform: str) -> None:
     """Refused, and within seconds of the processor: blanks are never read twice."""
 
     def refused() -> None:
         with pytest.raises(MotionloomError, match=r"transform|number"):
-            draw(f'<line transform="{said.format(" " * 200_000)}" x2="1"/>')
+            draw(f'<line transform="{transform.format(" " * 200_000)}" x2="1"/>')
 
     assert ends(refused)

@@ -90,7 +90,7 @@ def test_both_targets_are_in_merged_goals() -> None:
 
 
 @pytest.mark.parametrize(
-    ("second", "said"),
+    ("second", "sentence"),
     [
         (asking(3, "head", [1, 2.02, 3]), "head at 0.15 s .* 0.02 m apart"),
         (facing(3, 0.3), "at 0.15 s .* 17 degrees apart"),
@@ -99,9 +99,9 @@ def test_both_targets_are_in_merged_goals() -> None:
     ],
     ids=["place", "facing", "start", "length"],
 )
-def test_contradictions_are_reported(second: Goal, said: str) -> None:
+def test_contradictions_are_reported(second: Goal, sentence: str) -> None:
     first = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0)), start=GroundPose())
-    with pytest.raises(MotionloomError, match=said):
+    with pytest.raises(MotionloomError, match=sentence):
         merged(first, second)
 
 
@@ -127,9 +127,9 @@ def test_the_place_of_a_goal() -> None:
 def test_a_whole_pose_says_where_the_person_stands(place: GroundPose) -> None:
     goal = Goal.nothing(2)
     goal.positions[0], goal.mask[0] = place.to_world(SMPL22.rest_positions()), True
-    found = start_of(goal)
-    assert (found.x, found.z) == pytest.approx((place.x, place.z), abs=1e-9)
-    assert abs(turn_between(found.facing, place.facing)) < 1e-3
+    start = start_of(goal)
+    assert (start.x, start.z) == pytest.approx((place.x, place.z), abs=1e-9)
+    assert abs(turn_between(start.facing, place.facing)) < 1e-3
 
 
 def test_the_left_side_is_left_of_where_a_body_faces() -> None:

@@ -220,8 +220,8 @@ MISTAKES = {
 
 @pytest.mark.parametrize("name", MISTAKES)
 def test_mistakes_are_reported_by_their_key(name: str, read, folder: Path) -> None:
-    keys, said = MISTAKES[name]
-    with pytest.raises(MotionloomError, match=said) as error:
+    keys, sentence = MISTAKES[name]
+    with pytest.raises(MotionloomError, match=sentence) as error:
         read(**keys)
     assert str(error.value).startswith(str(folder / "goal.json"))
     with pytest.raises(MotionloomError) as error:
@@ -230,7 +230,7 @@ def test_mistakes_are_reported_by_their_key(name: str, read, folder: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "sentence"),
     [
         ("", "is empty"),
         ("{", "line 1: this is not JSON"),
@@ -246,10 +246,10 @@ def test_mistakes_are_reported_by_their_key(name: str, read, folder: Path) -> No
     ],
     ids=range(11),
 )
-def test_files_that_are_no_goals(tmp_path: Path, text: str, said: str) -> None:
+def test_files_that_are_no_goals(tmp_path: Path, text: str, sentence: str) -> None:
     file = tmp_path / "goal.json"
     file.write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(MotionloomError, match=said):
+    with pytest.raises(MotionloomError, match=sentence):
         read_goal(file, frames=100, folder=tmp_path)
 
 

@@ -32,7 +32,7 @@ def read(tmp_path):
 @pytest.mark.parametrize("indent", [None, 2, "\t"])
 def test_every_key_arrives_where_it_belongs(read, indent):
     """However the JSON is laid out; frames are those of the past's rate."""
-    asked = {
+    keys = {
         "hold": [
             {"joints": ["left_arm", "head"], "from": 0.0, "to": 1.5},
             {"joints": ["root"], "frames": [[0, 10], [20, 30]]},
@@ -41,12 +41,12 @@ def test_every_key_arrives_where_it_belongs(read, indent):
             {"joints": ["neck"]},
         ]
     }
-    found = read(json.dumps(asked, indent=indent), fps=40)
-    inside = [k for k in range(50) if any(a <= (k + 1) / 40 <= b for a, b in found[1].spans)]
+    parts = read(json.dumps(keys, indent=indent), fps=40)
+    inside = [k for k in range(50) if any(a <= (k + 1) / 40 <= b for a, b in parts[1].spans)]
     assert inside == [*range(10), *range(20, 30)]  # frame 0 lies 1/40 s behind the end of the past
-    assert found == (
+    assert parts == (
         FixedPart(("left_arm", "head"), ((0.0, 1.5),)),
-        FixedPart(("root",), found[1].spans),
+        FixedPart(("root",), parts[1].spans),
         FixedPart(("torso",), ((1.0, inf),)),
         FixedPart(("feet",), ((0.0, 0.5),)),
         FixedPart(("neck",), ((0.0, inf),)),
@@ -103,11 +103,11 @@ REFUSED = [
 def test_what_is_wrong_is_reported_with_its_line(read, tmp_path, text, line, message):
     with pytest.raises(MotionloomError) as refused:
         read(text)
-    said = str(refused.value)
-    assert message in said
-    assert said.startswith(f"{tmp_path / 'm.json'}, line ")
-    assert int(said.removeprefix(f"{tmp_path / 'm.json'}, line ").split(":")[0]) == line
-    assert "\n" not in said
+    sentence = str(refused.value)
+    assert message in sentence
+    assert sentence.startswith(f"{tmp_path / 'm.json'}, line ")
+    assert int(sentence.removeprefix(f"{tmp_path / 'm.json'}, line ").split(":")[0]) == line
+    assert "\n" not in sentence
 
 
 @pytest.mark.parametrize(("text", "message"), [("", "is empty"), ("a\0b", "binary"), (" " * 4_000_001, "MB")])
@@ -177,7 +177,7 @@ def test_what_is_read_fits_the_schema_and_what_fits_is_read(read, value):
     """But for stretches that end before they begin, about which a schema cannot speak."""
     try:
         read(json.dumps(value))
-        good, told = True, ""
+        good, sentence = True, ""
     except MotionloomError as error:
-        good, told = False, str(error)
-    assert valid(mask_schema(), value) is good or "must be after 'from'" in told or "before they begin" in told
+        good, sentence = False, str(error)
+    assert valid(mask_schema(), value) is good or "must be after 'from'" in sentence or "before they begin" in sentence

@@ -31,13 +31,13 @@ def test_one_thing_stays_whole(text: str) -> None:
 
 @pytest.mark.parametrize("row", TABLE["row"], ids=[row["text"] for row in TABLE["row"]])
 def test_one_after_the_other(row: dict) -> None:
-    found = [part.text for part in split_actions(row["text"])]
+    texts = [part.text for part in split_actions(row["text"])]
     if row.get("stop"):  # the end of the last action, or an action of its own
-        assert len(found) in (1, 2)
-        assert len(found) == 1 or re.search(r"\bstops?\b", found[1])
+        assert len(texts) in (1, 2)
+        assert len(texts) == 1 or re.search(r"\bstops?\b", texts[1])
         return
-    assert len(found) == len(row["parts"]), found
-    for text, asked in zip(found, row["parts"], strict=True):
-        wanted = action(asked)
+    assert len(texts) == len(row["parts"]), texts
+    for text, row_part in zip(texts, row["parts"], strict=True):
+        expected = action(row_part)
         assert "," not in text
-        assert bases(text)[-len(wanted) :] == wanted, found
+        assert bases(text)[-len(expected) :] == expected, texts

@@ -51,11 +51,11 @@ def test_between_two_times_a_coordinate_on_a_line_stays_between_its_points(steps
     """Whatever the points: monotone pieces, and the points themselves are met."""
     times, points = np.cumsum([0.0, *(s[0] for s in steps)]), np.cumsum([0.0, *(s[1] for s in steps)])
     at = np.sort(np.concatenate([np.linspace(0, times[-1], 301), times]))
-    found = through(points[:, None], times, at)[:, 0]
-    assert found[np.searchsorted(at, times)] == pytest.approx(points, abs=1e-9)
+    places = through(points[:, None], times, at)[:, 0]
+    assert places[np.searchsorted(at, times)] == pytest.approx(points, abs=1e-9)
     piece = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
-    assert (found >= np.minimum(points[piece], points[piece + 1]) - 1e-9).all()
-    assert (found <= np.maximum(points[piece], points[piece + 1]) + 1e-9).all()
+    assert (places >= np.minimum(points[piece], points[piece + 1]) - 1e-9).all()
+    assert (places <= np.maximum(points[piece], points[piece + 1]) + 1e-9).all()
 
 
 def test_a_turned_path_is_the_path_of_turned_points() -> None:

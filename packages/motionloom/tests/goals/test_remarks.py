@@ -45,10 +45,10 @@ def test_phrases_that_nobody_looked_at() -> None:
     }
     assert sum(called["unknown"]) >= 0.65 * len(called["unknown"])
     assert sum(called["known"]) <= 0.2 * len(called["known"])
-    said = remarks_on(
+    remarks = remarks_on(
         ["eine Person geht vorwärts", "vacuuming the living room", "a person walks"], prior.known, prior.text
     )
-    assert [one.text for one in said] == ["eine Person geht vorwärts", "vacuuming the living room"]
-    assert said[0].instead == ()
-    assert len(said[1].instead) == 3
-    assert all(f"'{sentence}'" in said[1].line for sentence in said[1].instead)
+    assert [one.text for one in remarks] == ["eine Person geht vorwärts", "vacuuming the living room"]
+    assert remarks[0].instead == ()
+    assert len(remarks[1].instead) == 3
+    assert all(f"'{sentence}'" in remarks[1].line for sentence in remarks[1].instead)

@@ -44,7 +44,7 @@ def test_a_part_without_words_is_refused(wrong: str) -> None:
 
 
 def test_what_two_do_without_who_they_are() -> None:
-    said = (
+    sentences = (
         "two people dance salsa",
         "A couple dances salsa",
         "both wave",
@@ -52,4 +52,4 @@ def test_what_two_do_without_who_they_are() -> None:
         "a person waves",
     )
     expected = ["dance salsa", "dances salsa", "wave", "perform a salsa", "a person waves"]
-    assert [without_two(text) for text in said] == expected
+    assert [without_two(text) for text in sentences] == expected

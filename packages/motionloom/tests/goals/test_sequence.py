@@ -231,9 +231,9 @@ def test_natural_lengths_stay_where_nothing_is_asked() -> None:
 @given(st.lists(st.floats(1.2, 12), min_size=1, max_size=9), st.floats(0.5, 60))
 def test_no_part_is_left_without_time(natural: list[float], seconds: float) -> None:
     parts = [Part("x", length) for length in natural]
-    found = lengths(parts, seconds)
-    assert sum(found) == pytest.approx(seconds, abs=0.026)
-    assert min(found) >= min(SHORTEST, seconds / len(parts)) - 0.051
+    seconds_each = lengths(parts, seconds)
+    assert sum(seconds_each) == pytest.approx(seconds, abs=0.026)
+    assert min(seconds_each) >= min(SHORTEST, seconds / len(parts)) - 0.051
 
 
 WORDS = "a person walks sits down and then , before after sitting waves . ; while turn 3 times"

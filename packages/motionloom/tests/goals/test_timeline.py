@@ -61,8 +61,8 @@ def test_every_key_arrives_where_it_belongs(read, tmp_path):
         """
     )
     assert (timeline.seed, timeline.guidance, timeline.start) == (7, 3, tmp_path / "clip.bvh")
-    said = [(s.text, s.seconds, s.guidance, s.transition) for s in timeline.segments]
-    assert said == [
+    segments = [(s.text, s.seconds, s.guidance, s.transition) for s in timeline.segments]
+    assert segments == [
         ("a person walks", 5, None, 0.5),
         ("jumps", 2.5, 4, 1.25),
         ("waves", 3, None, 0.5),
@@ -204,10 +204,10 @@ def test_what_is_wrong_is_reported_with_its_line(read, tmp_path, monkeypatch, te
         return
     with pytest.raises(MotionloomError) as refused:
         read(text)
-    said = str(refused.value)
-    assert message in said
-    assert said.startswith(f"{tmp_path / 't.yaml'}, line {line}: ")
-    assert "\n" not in said
+    sentence = str(refused.value)
+    assert message in sentence
+    assert sentence.startswith(f"{tmp_path / 't.yaml'}, line {line}: ")
+    assert "\n" not in sentence
 
 
 @pytest.mark.parametrize(
@@ -264,16 +264,16 @@ ODD = st.sampled_from([*WORDS.split(), "\n", "\n\n", "\n  ", "\t", "\u2028", "\u
     quick=st.booleans(),
 )
 def test_any_bytes_are_a_timeline_or_one_sentence(read, data, quick):
-    said = ""
+    sentence = ""
     before, lined_yaml._loader = lined_yaml._loader, lambda: yaml.CSafeLoader if quick else yaml.SafeLoader
     try:
         assert read(data).segments
     except MotionloomError as error:
-        said = str(error)
+        sentence = str(error)
     finally:
         lined_yaml._loader = before
-    assert "\n" not in said
-    assert len(said) < 700
+    assert "\n" not in sentence
+    assert len(sentence) < 700
 
 
 JSON = st.recursive(
@@ -290,8 +290,8 @@ JSON = st.recursive(
 def test_plain_values_survive(tmp_path, value):
     """What PyYAML writes is read as PyYAML would read it."""
     (tmp_path / "v.yaml").write_text(yaml.safe_dump(value))
-    found = lined_yaml.read_lined(tmp_path / "v.yaml").plain()
-    assert found == yaml.safe_load(yaml.safe_dump(value)) or isinstance(value, float)
+    values = lined_yaml.read_lined(tmp_path / "v.yaml").plain()
+    assert values == yaml.safe_load(yaml.safe_dump(value)) or isinstance(value, float)
 
 
 # The schema ------------------------------------------------------------------------------------------------------

@@ -6,12 +6,12 @@ import numpy as np
 
 from motionloom.features.layout import FEET
 from motionloom.kinematics.feet import clean_feet, planted_feet
-from motionloom.live.body import put
+from motionloom.live.body import transfer
 from motionloom.retarget.transfer import joints22, move_feet
 from motionloom.skeleton import SMPL22, Skeleton
 from tests.kinematics.test_feet import slider
 
-FPS, SHOWN = 20, 10
+FPS, PAST = 20, 10
 
 
 def long_legged() -> Skeleton:
@@ -23,34 +23,34 @@ def long_legged() -> Skeleton:
 
 def test_feet_that_stand_stand_on_another_skeleton_too_and_what_was_shown_stays() -> None:
     motion = clean_feet(slider())
-    before = put(motion, long_legged(), None).frames(0, SHOWN)
-    shown = replace(before, root=before.root + np.linspace([0.0, 0, 0], [0.03, 0, 0.02], SHOWN))
-    made = put(motion, long_legged(), shown)
-    assert np.array_equal(made.root[:SHOWN], shown.root)
-    assert np.array_equal(made.rotations[:SHOWN], shown.rotations)
-    planted, places = planted_feet(motion.positions(), FPS), joints22(made)
+    before = transfer(motion, long_legged(), None).frames(0, PAST)
+    past = replace(before, root=before.root + np.linspace([0.0, 0, 0], [0.03, 0, 0.02], PAST))
+    moved = transfer(motion, long_legged(), past)
+    assert np.array_equal(moved.root[:PAST], past.root)
+    assert np.array_equal(moved.rotations[:PAST], past.rotations)
+    planted, places = planted_feet(motion.positions(), FPS), joints22(moved)
     toes = places[:, [FEET[1], FEET[3]]][..., [0, 2]]
-    stands = (planted[1:] & planted[:-1])[:, [1, 3]]
+    planted_pairs = (planted[1:] & planted[:-1])[:, [1, 3]]
     steps = np.linalg.norm(np.diff(toes, axis=0), axis=-1)
-    assert stands[SHOWN - 1 :].sum() > 20
-    assert np.median(steps[SHOWN - 1 :][stands[SHOWN - 1 :]]) < 1e-3
-    assert steps[SHOWN - 1 :][stands[SHOWN - 1 :]].mean() < 2e-3
-    usual = np.diff(joints22(put(motion, long_legged(), None)), axis=0)
-    extra = np.linalg.norm(np.diff(places, axis=0) - usual, axis=-1)[SHOWN - 1]
+    assert planted_pairs[PAST - 1 :].sum() > 20
+    assert np.median(steps[PAST - 1 :][planted_pairs[PAST - 1 :]]) < 1e-3
+    assert steps[PAST - 1 :][planted_pairs[PAST - 1 :]].mean() < 2e-3
+    usual = np.diff(joints22(transfer(motion, long_legged(), None)), axis=0)
+    extra = np.linalg.norm(np.diff(places, axis=0) - usual, axis=-1)[PAST - 1]
     assert extra.max() < 0.03, "no jump where the shown frames end"
 
 
 def test_one_frame_that_was_shown_is_enough_to_go_on_from() -> None:
     motion = clean_feet(slider())
-    shown = put(motion, long_legged(), None).frames(0, 1)
-    shown = replace(shown, root=shown.root + np.array([0.03, 0.0, 0.02]))
-    made = put(motion, long_legged(), shown)
-    assert np.array_equal(made.root[:1], shown.root)
-    assert np.linalg.norm(made.root[1] - made.root[0]) < 0.03
+    past = transfer(motion, long_legged(), None).frames(0, 1)
+    past = replace(past, root=past.root + np.array([0.03, 0.0, 0.02]))
+    moved = transfer(motion, long_legged(), past)
+    assert np.array_equal(moved.root[:1], past.root)
+    assert np.linalg.norm(moved.root[1] - moved.root[0]) < 0.03
 
 
 def test_a_foot_goes_where_it_is_moved_and_nothing_above_the_hips_does() -> None:
-    motion = put(clean_feet(slider()), long_legged(), None)
+    motion = transfer(clean_feet(slider()), long_legged(), None)
     shift = np.zeros((len(motion), 2, 3))
     shift[:, 0, 0] = 0.03
     old, new = joints22(motion), joints22(move_feet(motion, shift))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, Taken
+from motionloom.live.commands import Command, FrameCommand, Path, Pose, Reach, Say, Steer
 from motionloom.live.live import Frame, Live, motion_of
 from motionloom.live.person import stays
 from motionloom.live.settings import Settings
@@ -46,10 +46,10 @@ def played(live: Live, script: Mapping[int, list[Command]], count: int) -> list[
     return frames
 
 
-def asked_at(taken: list[Taken]) -> dict[int, list[Command]]:
+def asked_at(log: list[FrameCommand]) -> dict[int, list[Command]]:
     """A script of what was taken."""
     script: dict[int, list[Command]] = {}
-    for frame, command, _ in taken:
+    for frame, command, _ in log:
         script.setdefault(frame, []).append(command)
     return script
 
@@ -69,9 +69,9 @@ def test_the_same_seed_and_script_make_the_same_motion_and_another_seed_another(
 
 def test_frames_before_a_command_do_not_know_of_it_and_those_behind_do(prior: Prior) -> None:
     quiet = played(Live(prior, seed=3, settings=QUICK), {0: [Say(WALK)]}, 60)
-    asked = played(Live(prior, seed=3, settings=QUICK), {0: [Say(WALK)], 30: [Steer(2.0, 1.5)]}, 60)
-    assert same(quiet[:30], asked[:30])
-    assert not same(quiet[30:34], asked[30:34])
+    steered = played(Live(prior, seed=3, settings=QUICK), {0: [Say(WALK)], 30: [Steer(2.0, 1.5)]}, 60)
+    assert same(quiet[:30], steered[:30])
+    assert not same(quiet[30:34], steered[30:34])
 
 
 def test_a_frame_that_was_handed_out_is_never_changed(prior: Prior) -> None:
@@ -97,8 +97,8 @@ def test_what_was_taken_up_replays_the_session_at_any_rate_and_spacing(prior: Pr
     for fps in (20, 24, 10):
         live = Live(prior, seed=5, fps=fps, settings=QUICK)
         live.stretch(0.6)
-        made = played(live, SCRIPT, 80)
-        assert same(made, played(Live(prior, seed=5, fps=fps, settings=QUICK), asked_at(live.taken), 80)), fps
+        session = played(live, SCRIPT, 80)
+        assert same(session, played(Live(prior, seed=5, fps=fps, settings=QUICK), asked_at(live.taken), 80)), fps
 
 
 @pytest.mark.parametrize("fps", [20, 48])
@@ -110,21 +110,21 @@ def test_frames_can_be_made_anew_from_any_on_and_be_as_they_were(prior: Prior, f
     for _ in range(90):
         marks.append(live.mark())
         frames += played(live, script, 1)
-    taken = live.taken
+    log = live.taken
     for at in (0, 13, 41, 59, 60, 75, 89):
-        before = asked_at([one for one in taken if one.frame < at])
+        before = asked_at([one for one in log if one.frame < at])
         undo = live.back(marks[at])
         assert live.number == at
         live.ask(Steer(2.0, 1.0))
-        made = [next(live) for _ in range(100 - at)]
-        again = [one.command for one in taken if one.frame >= at]
+        anew = [next(live) for _ in range(100 - at)]
+        again = [one.command for one in log if one.frame >= at]
         expected = played(Live(prior, seed=3, fps=fps, settings=QUICK), {**before, at: [*again, Steer(2.0, 1.0)]}, 100)
-        assert same(made, expected[at:]), at
+        assert same(anew, expected[at:]), at
         live.forth(undo)
         assert live.number == 90
-        assert live.taken == taken
+        assert live.taken == log
     frames += [next(live) for _ in range(30)]
-    assert same(frames, played(Live(prior, seed=3, fps=fps, settings=QUICK), asked_at(taken), 120))
+    assert same(frames, played(Live(prior, seed=3, fps=fps, settings=QUICK), asked_at(log), 120))
 
 
 def test_faster_frames_show_the_same_poses_and_what_lies_between(prior: Prior) -> None:
@@ -214,10 +214,10 @@ def test_a_wrist_reaches_its_place_in_time(real: Prior) -> None:
     live = Live(real, seed=1)
     live.say("a person stands still")
     at = live.take(40).positions()[-1]
-    wanted = at[16] + [0.15, 0.1, 0.35]
-    live.reach("left_wrist", wanted, within=0.8)
+    target = at[16] + [0.15, 0.1, 0.35]
+    live.reach("left_wrist", target, within=0.8)
     places = live.take(22).positions()[:, 20]
-    assert np.linalg.norm(places[15:19] - wanted, axis=-1).min() < 0.06
+    assert np.linalg.norm(places[15:19] - target, axis=-1).min() < 0.06
 
 
 def fastest(motion: Motion) -> float:
@@ -226,12 +226,12 @@ def fastest(motion: Motion) -> float:
 
 
 def test_what_is_out_of_reach_is_walked_to_first(real: Prior) -> None:
-    wanted = np.array([3.0, 1.3, 1.0])
+    target = np.array([3.0, 1.3, 1.0])
     live = Live(real, seed=1)
     live.take(20)
-    live.reach("right_wrist", wanted)
+    live.reach("right_wrist", target)
     motion = live.take(160)
-    assert np.linalg.norm(motion.positions()[:, 21] - wanted, axis=-1).min() < 0.12
+    assert np.linalg.norm(motion.positions()[:, 21] - target, axis=-1).min() < 0.12
     assert fastest(motion) < 2.5
     assert fastest(motion.frames(140, 160)) < 0.3, "he stays there"
 
@@ -266,9 +266,9 @@ def test_two_hands_reach_far_places_one_after_the_other(real: Prior) -> None:
     live.take(20)
     live.reach("right_wrist", places[21])
     live.reach("left_wrist", places[20])
-    seen = live.take(240).positions()
+    motion = live.take(240).positions()
     for joint, place in places.items():
-        assert np.linalg.norm(seen[:, joint] - place, axis=-1).min() < 0.12
+        assert np.linalg.norm(motion[:, joint] - place, axis=-1).min() < 0.12
 
 
 def test_who_is_steered_elsewhere_gives_up_what_he_walked_to(real: Prior) -> None:
@@ -338,11 +338,11 @@ def test_a_pose_is_taken_where_the_person_is(real: Prior) -> None:
     live.take(40)
     other = Live(real, seed=9)
     other.say("a person raises both arms")
-    wanted = other.take(40)
-    live.pose(wanted.frames(30, 31), within=0.8)
-    got = live.take(20).positions()[16]
-    want = wanted.positions()[30]
-    off = (got[[20, 21]] - got[0])[:, 1] - (want[[20, 21]] - want[0])[:, 1]
+    target = other.take(40)
+    live.pose(target.frames(30, 31), within=0.8)
+    places = live.take(20).positions()[16]
+    want = target.positions()[30]
+    off = (places[[20, 21]] - places[0])[:, 1] - (want[[20, 21]] - want[0])[:, 1]
     assert np.abs(off).max() < 0.15
 
 

@@ -34,38 +34,38 @@ def run(prior: Prior, count: int) -> list[np.ndarray]:
 
 
 def test_what_is_asked_of_both_or_one_is_taken_and_makes_the_same_again() -> None:
-    made = people.prior()
-    pair = LivePair(made, block(made), seed=2, settings=QUICK)
+    prior = people.prior()
+    pair = LivePair(prior, block(prior), seed=2, settings=QUICK)
     pair.ask(Say("a person walks :: a person waves"))
     frames = [next(pair) for _ in range(9)]
     pair.ask(Steer(1.0, 1.0), 1)
     pair.ask(Say("a person jumps"))
     frames += [next(pair) for _ in range(6)]
-    asked = pair.taken
-    assert asked == [
+    log = pair.taken
+    assert log == [
         (0, Say("a person walks"), 0),
         (0, Say("a person waves"), 1),
         (9, Say("a person jumps"), 0),
         (9, Steer(1.0, 1.0), 1),
         (9, Say("a person jumps"), 1),
     ]
-    again = LivePair(made, block(made), seed=2, settings=QUICK)
+    again = LivePair(prior, block(prior), seed=2, settings=QUICK)
     for old in frames:
-        for one in asked:
+        for one in log:
             if one.frame == old[0].number:
                 again.ask(one.command, one.person)
         assert all(np.array_equal(a.rotations, b.rotations) for a, b in zip(old, next(again), strict=True))
 
 
 def test_nobody_else_and_no_third_sentence_can_be_asked() -> None:
-    made = people.prior()
-    pair = LivePair(made, block(made), settings=QUICK)
+    prior = people.prior()
+    pair = LivePair(prior, block(prior), settings=QUICK)
     with pytest.raises(MotionloomError, match="no person 3"):
         pair.ask(Steer(), 2)
     with pytest.raises(MotionloomError, match="words for each person"):
         pair.say("a :: b :: c")
     with pytest.raises(MotionloomError, match="no person 2"):
-        Live(made, settings=QUICK).ask(Steer(), 1)
+        Live(prior, settings=QUICK).ask(Steer(), 1)
 
 
 def test_two_people_are_the_same_again_and_only_who_is_steered_goes(prior: Prior) -> None:

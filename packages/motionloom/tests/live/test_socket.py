@@ -48,15 +48,15 @@ class Client:
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
         self.code = code
 
-    def say(self, **said: Any) -> None:
-        self.sent.put_nowait(json.dumps(said))
+    def say(self, **fields: Any) -> None:
+        self.sent.put_nowait(json.dumps(fields))
 
     async def next(self, kind: str) -> dict[str, Any]:
         """The next message of a kind; others before it are passed over."""
         while True:
-            found = await asyncio.wait_for(self.got.get(), PATIENCE)
-            if found["type"] == kind:
-                return found
+            answer = await asyncio.wait_for(self.got.get(), PATIENCE)
+            if answer["type"] == kind:
+                return answer
 
     async def frames(self, count: int) -> list[dict[str, Any]]:
         return [await self.next("frame") for _ in range(count)]
@@ -64,10 +64,10 @@ class Client:
 
 @pytest.fixture
 def sessions() -> Iterator[Sessions]:
-    made = people.prior()
-    found = Sessions(lambda: made, block=block, most=2, settings=QUICK)
-    yield found
-    found.close()
+    prior = people.prior()
+    pool = Sessions(lambda: prior, block=block, most=2, settings=QUICK)
+    yield pool
+    pool.close()
 
 
 T = TypeVar("T")
@@ -124,12 +124,12 @@ def test_what_is_recorded_is_what_was_taken_up(sessions: Sessions) -> None:
         while True:
             await client.frames(1)
             client.say(type="record")
-            found = await client.next("recorded")
-            if found["commands"]:
+            record = await client.next("recorded")
+            if record["commands"]:
                 break
-        (command,) = found["commands"]
+        (command,) = record["commands"]
         assert (command["type"], command["direction"], command["speed"]) == ("steer", 90.0, 1.5)
-        assert found["seed"] == 7
+        assert record["seed"] == 7
 
     talk(sessions, lead)
 
@@ -148,14 +148,14 @@ def test_two_people_come_in_one_frame_and_each_is_asked_by_number(sessions: Sess
             (frame,) = await client.frames(1)
             assert [len(one["rotations"]) for one in frame["people"]] == [22, 22]
             client.say(type="record")
-            found = await client.next("recorded")
-            if len(found["commands"]) == 3:
+            record = await client.next("recorded")
+            if len(record["commands"]) == 3:
                 break
-        said = {(one["person"], one["type"]): one for one in found["commands"]}
-        assert said[1, "say"]["text"] == "a person walks"
-        assert said[2, "say"]["text"] == "a person stands still"
-        assert said[2, "steer"]["direction"] == 90.0
-        assert found["people"] == 2
+        commands = {(one["person"], one["type"]): one for one in record["commands"]}
+        assert commands[1, "say"]["text"] == "a person walks"
+        assert commands[2, "say"]["text"] == "a person stands still"
+        assert commands[2, "steer"]["direction"] == 90.0
+        assert record["people"] == 2
 
     talk(sessions, lead)
 
@@ -172,7 +172,7 @@ def test_who_is_alone_has_no_second_person(sessions: Sessions) -> None:
 
 
 def test_rubbish_is_answered_and_too_much_of_it_ends_the_connection_but_not_that_of_others(sessions: Sessions) -> None:
-    done = asyncio.Event()
+    over = asyncio.Event()
 
     async def rude(client: Client) -> None:
         client.say(type="hello")
@@ -184,12 +184,12 @@ def test_rubbish_is_answered_and_too_much_of_it_ends_the_connection_but_not_that
             client.sent.put_nowait("?")
         while not (await client.next("error")).get("last"):
             pass
-        done.set()
+        over.set()
 
     async def polite(client: Client) -> None:
         client.say(type="hello", fps=30)
         await client.next("welcome")
-        await asyncio.wait_for(done.wait(), PATIENCE)
+        await asyncio.wait_for(over.wait(), PATIENCE)
         await client.frames(5)
 
     bad, good = talk(sessions, rude, polite)
@@ -333,10 +333,10 @@ FIELDS = [
     st.dictionaries(st.sampled_from(FIELDS), JUNK, max_size=4),
 )
 def test_whatever_a_client_says_is_a_command_or_one_sentence(kind: str, fields: dict[str, Any]) -> None:
-    said = {**fields, "type": kind}
+    message = {**fields, "type": kind}
     sentence = ""
     try:
-        messages.hello(said) if kind == "hello" else (from_json(said), person_of(said))
+        messages.hello(message) if kind == "hello" else (from_json(message), person_of(message))
     except MotionloomError as error:
         sentence = str(error)
     assert len(sentence) < 500

@@ -65,8 +65,8 @@ def test_the_server_describes_the_fields(task: str) -> None:
 
 def test_the_page_has_the_types_that_the_server_says() -> None:
     pytest.importorskip("starlette", reason="needs the extra 'studio'")
-    written = runpy.run_path(str(ROOT / "tools" / "write_types.py"))
-    assert written["PLACE"].read_text(encoding="utf-8") == written["types"](), "run tools/write_types.py"
+    tool = runpy.run_path(str(ROOT / "tools" / "write_types.py"))
+    assert tool["PLACE"].read_text(encoding="utf-8") == tool["types"](), "run tools/write_types.py"
 
 
 def test_assistants_have_a_tool_for_every_task(tmp_path: Path) -> None:
@@ -94,16 +94,16 @@ def test_a_file_of_a_motion_is_asked_alike_everywhere(tmp_path: Path) -> None:
     by_name = {"motion", "format", "person", "name"}  # which files say
     for name in known.keys() - by_name - {"skeleton"}:
         assert known[name].help in options[option(name, known[name])].help
-    said = document(Limits())["paths"]["/motions/{id}.{format}"]["get"]["parameters"]
-    assert {one["name"] for one in said} == known.keys() - {"motion", "name"} | {"id"}
-    assert {one["name"]: one["description"] for one in said}["mirror"] == known["mirror"].help
+    parameters = document(Limits())["paths"]["/motions/{id}.{format}"]["get"]["parameters"]
+    assert {one["name"] for one in parameters} == known.keys() - {"motion", "name"} | {"id"}
+    assert {one["name"]: one["description"] for one in parameters}["mirror"] == known["mirror"].help
 
 
 def test_the_picture_of_the_architecture_is_that_of_the_code() -> None:
-    drawn = runpy.run_path(str(ROOT / "tools" / "draw_architecture.py"))
-    assert drawn["PLACE"].read_text(encoding="utf-8") == drawn["picture"](), "run tools/draw_architecture.py"
-    rooms = {place.split("/")[0] for _, place in drawn["DOORS"] if "/" in place}
-    rooms |= {one.strip().split("/")[0] for _, places, _ in drawn["STEPS"] for one in places.split(",")}
+    tool = runpy.run_path(str(ROOT / "tools" / "draw_architecture.py"))
+    assert tool["PLACE"].read_text(encoding="utf-8") == tool["picture"](), "run tools/draw_architecture.py"
+    rooms = {place.split("/")[0] for _, place in tool["DOORS"] if "/" in place}
+    rooms |= {one.strip().split("/")[0] for _, places, _ in tool["STEPS"] for one in places.split(",")}
     package = ROOT / "packages" / "motionloom" / "src" / "motionloom"
     assert [room for room in rooms if not (package / room).is_dir()] == []
 

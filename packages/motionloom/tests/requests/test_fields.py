@@ -21,7 +21,7 @@ SOURCE = Path(motionloom.__file__).parent
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "sentence"),
     [
         ({}, "the task 'generate' has no 'prompt'; it needs prompt"),
         ({"prompt": " "}, "a prompt is empty; say in words what the person does"),
@@ -38,8 +38,8 @@ SOURCE = Path(motionloom.__file__).parent
         ({"prompt": "a", "solver": ["ddpm"]}, "'solver' is a list of 1; there are ddpm, "),
     ],
 )
-def test_a_mistake_is_one_sentence_that_names_its_key(values: dict[str, Any], said: str) -> None:
-    with pytest.raises(MotionloomError, match=re.escape(said)):
+def test_a_mistake_is_one_sentence_that_names_its_key(values: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(MotionloomError, match=re.escape(sentence)):
         read(Generate, values, "the task 'generate'")
 
 
@@ -51,9 +51,11 @@ def test_a_door_may_take_less() -> None:
 
 
 def test_values_come_as_the_fields_hold_them() -> None:
-    found = read(Generate, {"prompt": "a", "seconds": 3, "seed": np.int64(7), "steps": 12.0, "loop": None}, "the task")
-    assert (found.seconds, found.sampling.seed, found.sampling.steps, found.loop) == (3.0, 7, 12, False)
-    assert (type(found.seconds), type(found.sampling.seed), type(found.sampling.steps)) == (float, int, int)
+    request = read(
+        Generate, {"prompt": "a", "seconds": 3, "seed": np.int64(7), "steps": 12.0, "loop": None}, "the task"
+    )
+    assert (request.seconds, request.sampling.seed, request.sampling.steps, request.loop) == (3.0, 7, 12, False)
+    assert (type(request.seconds), type(request.sampling.seed), type(request.sampling.steps)) == (float, int, int)
 
 
 JSON = (
@@ -65,12 +67,12 @@ JSON = (
 def test_any_values_are_a_request_or_one_sentence(task: str, data: st.DataObject) -> None:
     keys = st.sampled_from(list(specs(REQUESTS[task])))
     values = data.draw(st.dictionaries(keys, JSON, max_size=5))
-    found: object
+    request: object
     try:
-        found = read(REQUESTS[task], values, f"the task {task!r}")
+        request = read(REQUESTS[task], values, f"the task {task!r}")
     except MotionloomError as error:
-        found = str(error)
-    assert isinstance(found, REQUESTS[task]) or (isinstance(found, str) and "\n" not in found)
+        request = str(error)
+    assert isinstance(request, REQUESTS[task]) or (isinstance(request, str) and "\n" not in request)
 
 
 def test_what_somebody_types_is_read_as_json_is() -> None:
@@ -113,5 +115,5 @@ ONCE = {
 def test_every_bound_is_written_once(what: str) -> None:
     line = re.compile(f".*(?:{ONCE[what]}).*", re.MULTILINE)
     rooms = [path for path in SOURCE.rglob("*.py") if "lab" not in path.parts]
-    found = [(path.name, one) for path in rooms for one in line.findall(path.read_text())]
-    assert len(found) == 1, found
+    matches = [(path.name, one) for path in rooms for one in line.findall(path.read_text())]
+    assert len(matches) == 1, matches

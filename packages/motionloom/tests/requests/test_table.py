@@ -44,7 +44,7 @@ from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import generate
 from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
-from tests.bulk.rows import options, written
+from tests.bulk.rows import options, write_jobs
 from tests.cli.predict.clips import tiny_predictor
 from tests.recorded import tiny
 from tests.tasks.two_people import CLIP, block
@@ -94,14 +94,14 @@ def test_every_command_has_them_all(
     words += [word for out in outs for word in ("--out", out)]
     words += ["--best-of", "2", "--steps", "2", "--skeleton", "mixamo", "--root", OWN_ROOT, "--json", "--force"]
     assert main(words) == 0
-    said = json.loads(capsys.readouterr().out)
-    told = said["happened"] if "happened" in said else said["motions"][0]["happened"]
-    people = np.ravel(np.array(told, dtype=object)).tolist()
+    report = json.loads(capsys.readouterr().out)
+    happened = report["happened"] if "happened" in report else report["motions"][0]["happened"]
+    people = np.ravel(np.array(happened, dtype=object)).tolist()
     assert len(people) == len(outs)
     assert all("sentence" in one for one in people)
     for out in outs:
-        made = io.load(out)
-        hips = made.positions()[:, made.skeleton.names.index("mixamorig:Hips")]
+        motion = io.load(out)
+        hips = motion.positions()[:, motion.skeleton.names.index("mixamorig:Hips")]
         assert np.ptp(hips[:, [0, 2]], axis=0).max() < 1e-6
 
 
@@ -130,7 +130,7 @@ def test_every_request_has_the_best_of_several(task: str) -> None:
     assert option("best_of", specs(REQUESTS[task])["best_of"]) == "--best-of"
 
 
-def asked(task: str, files: Path, project: Any) -> dict[str, Any]:
+def body_of(task: str, files: Path, project: Any) -> dict[str, Any]:
     clip = project.add([io.load(CLIP)], {}).id
     about: dict[str, dict[str, Any]] = {
         "generate": {"prompt": "a person walks", "seconds": 1.0},
@@ -158,17 +158,17 @@ def test_the_server_and_assistants_have_them_too(task: str, files: Path, tmp_pat
     limits = Limits()
     project = Project(tmp_path, limits)
     worker = Worker(project, limits)
-    request = read_request(asked(task, files, project), project, limits)
+    request = read_request(body_of(task, files, project), project, limits)
     assert request.sampling.best_of == 2
     job, prior = Job(request, "test", limits.level_bytes_per_job), tiny.prior()
     worker._draw(Models(prior, block(prior), tiny_predictor()), [job])
     assert job.error is None
     for one in job.public()["results"]:
         assert all(did["sentence"] for did in one["happened"])
-        made = io.load(
+        motion = io.load(
             export(project, Export(motion=one["id"], format="npz", skeleton="mixamo", person=0, root=OWN_ROOT))
         )
-        hips = made.positions()[:, made.skeleton.names.index("mixamorig:Hips")]
+        hips = motion.positions()[:, motion.skeleton.names.index("mixamorig:Hips")]
         assert np.ptp(hips[:, [0, 2]], axis=0).max() < 1e-6
 
 
@@ -183,18 +183,18 @@ def test_a_job_of_the_server_has_adapters_of_its_own(task: str, files: Path, tmp
 
     prior, limits, project = tiny.prior(), Limits(), Project(tmp_path, Limits())
     tiny.adapter(prior).save(project.adapters / "zombie.safetensors")
-    models, plain = Models(prior, block(prior)), asked(task, files, project) | {"best_of": 1}
+    models, plain = Models(prior, block(prior)), body_of(task, files, project) | {"best_of": 1}
     with pytest.raises(MotionloomError, match=r"'adapter' names 'none\.safetensors', and there is no such file"):
         read_request(plain | {"adapter": ["none.safetensors"]}, project, limits)
 
-    def drawn(*adapters: str) -> np.ndarray:
+    def positions(*adapters: str) -> np.ndarray:
         request = read_request(plain | {"adapter": list(adapters)}, project, limits)
-        [made] = draw(models, request, lambda done, of: None)
-        return np.stack([one.positions() for one in made.people])
+        [result] = draw(models, request, lambda calls, of: None)
+        return np.stack([one.positions() for one in result.people])
 
-    before, taught = drawn(), drawn("zombie.safetensors:0.5")
+    before, taught = positions(), positions("zombie.safetensors:0.5")
     assert np.abs(taught - before).max() > 1e-4
-    assert np.array_equal(drawn(), before)
+    assert np.array_equal(positions(), before)
 
 
 def test_assistants_can_say_it_and_export_on_skeletons(tmp_path: Path) -> None:
@@ -224,15 +224,15 @@ def test_rows_of_a_batch_have_them(files: Path, tmp_path: Path, monkeypatch: pyt
         {"task": "duet", "prompt": "two people dance", "seconds": 1.0},
         {"task": "duet", "timeline": "timeline.yaml"},
     ]
-    job = written(tmp_path / "jobs.jsonl", [row | {"best_of": 2} for row in rows])
+    job = write_jobs(tmp_path / "jobs.jsonl", [row | {"best_of": 2} for row in rows])
     how = options(
         str(files / "prior.safetensors"),
         pair_weights=str(files / "block.safetensors"),
         skeleton=str(tmp_path / "rest.bvh"),
         root=OWN_ROOT,
     )
-    found = list(batch(job, "out", options=how))
-    assert [one.why for one in found if one.state != "made"] == []
+    results = list(batch(job, "out", options=how))
+    assert [one.why for one in results if one.state != "made"] == []
     people = [motion for one in read_batch(tmp_path / "out") for motion in one.people]
     assert len(people) == 7
     assert max(np.ptp(motion.positions()[:, 0, [0, 2]], axis=0).max() for motion in people) < 1e-4
@@ -251,8 +251,8 @@ def second_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motionloom.tasks.completion.index_of_smallest", second)
 
 
-def the_same(made: Sequence[Motion], expected: Sequence[Motion]) -> None:
-    for one, other in zip(made, expected, strict=True):
+def the_same(motions: Sequence[Motion], expected: Sequence[Motion]) -> None:
+    for one, other in zip(motions, expected, strict=True):
         np.testing.assert_allclose(one.positions(), other.positions(), atol=2e-4)
 
 
@@ -269,23 +269,23 @@ def test_of_words_goals_and_clips_the_seed_that_is_chosen_makes_the_motion() -> 
     goal = read_goal(GOAL, frames=20, folder=Path())
     clip = io.load(CLIP)
 
-    def made(**how: Any) -> list[Motion]:
+    def generated(**how: Any) -> list[Motion]:
         how |= {"steps": 4}
         controlled = control(prior, WALK, goal, **how)[0].motion
         return [*generate(prior, WALK, seconds=1.0, **how), controlled, *edit(prior, clip, "a person waves", **how)]
 
-    the_same(made(seed=SEED, best_of=2), made(seed=other))
+    the_same(generated(seed=SEED, best_of=2), generated(seed=other))
 
 
 @pytest.mark.usefixtures("second_chosen")
 def test_of_two_people_both_have_the_seeds_that_are_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     prior = tiny.prior()
     pair, words = block(prior), "two people hug"
-    [made] = generate_pair(prior, pair, words, seconds=1.0, seed=SEED, best_of=2, steps=4)
+    [duet] = generate_pair(prior, pair, words, seconds=1.0, seed=SEED, best_of=2, steps=4)
     chosen = [candidate_seeds(seed, 2)[1] for seed in person_seeds(SEED, 0)]
     monkeypatch.setattr("motionloom.tasks.pair.pair_seeds", lambda sampling: chosen)
     [expected] = generate_pair(prior, pair, words, seconds=1.0, seed=SEED, steps=4)
-    the_same(made, expected)
+    the_same(duet, expected)
 
 
 @pytest.mark.usefixtures("second_chosen")
@@ -302,16 +302,16 @@ def test_rows_of_a_chain_are_chosen_one_by_one(monkeypatch: pytest.MonkeyPatch) 
         duets = list(compose_pair(prior, pair, segments, seed=SEED, steps=4, best_of=best_of))
         return [one, *(concatenate(*[duet[i] for duet in duets]) for i in (0, 1))]
 
-    made = both(2)
+    several = both(2)
     monkeypatch.setattr("motionloom.tasks.sampling.candidate_seeds", lambda seed, count: [candidate_seeds(seed, 2)[1]])
-    the_same(made, both(1))
+    the_same(several, both(1))
 
 
 @pytest.mark.usefixtures("second_chosen")
 def test_of_futures_each_window_is_chosen() -> None:
     predictor, clip = tiny_predictor(), io.load(CLIP)
     how = PredictionSampling(count=2, steps=4, seed=3)
-    for task in (predict, lambda *given, **more: switch(*given[:2], clip, **more)):
+    for task in (predict, lambda *places, **more: switch(*places[:2], clip, **more)):
         plain = task(predictor, clip, seconds=1.0, sampling=how)
         chosen = task(predictor, clip, seconds=1.0, sampling=replace(how, best_of=3))
         assert all(np.abs(a.positions() - b.positions()).max() > 1e-4 for a, b in zip(plain, chosen, strict=True))

@@ -11,8 +11,8 @@ from tests.server.serving import Server, running
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     pytest.importorskip("starlette", reason="needs the extra 'studio': pip install 'motionloom[studio]'")
     pytest.importorskip("uvicorn", reason="needs the extra 'studio': pip install 'motionloom[studio]'")
-    with running(tmp_path_factory.mktemp("project")) as found:
-        yield found
+    with running(tmp_path_factory.mktemp("project")) as instance:
+        yield instance
 
 
 @pytest.fixture(scope="session")

@@ -48,9 +48,9 @@ class Server:
         status, _, data = self.ask(method, path, body, headers=headers)
         return status, json.loads(data)
 
-    def submit(self, client: str = "test", /, **asked: Any) -> str:
+    def submit(self, client: str = "test", /, **fields: Any) -> str:
         """The id of a new job."""
-        status, answer = self.json("POST", "/jobs", asked, headers={"X-Client": client})
+        status, answer = self.json("POST", "/jobs", fields, headers={"X-Client": client})
         assert status == 202, answer
         return answer["id"]
 
@@ -61,15 +61,15 @@ class Server:
             connection.request("GET", f"/jobs/{job}/events", headers={"Last-Event-ID": str(after)} if after else {})
             answer = connection.getresponse()
             assert answer.status == 200, answer.read()
-            found: dict[str, str] = {}
+            fields: dict[str, str] = {}
             for raw in answer:
                 line = raw.decode().rstrip("\n")
                 if line:
                     key, _, value = line.partition(": ")
-                    found[key] = value
-                elif "event" in found:
-                    yield int(found["id"]), found["event"], json.loads(found["data"])
-                    found = {}
+                    fields[key] = value
+                elif "event" in fields:
+                    yield int(fields["id"]), fields["event"], json.loads(fields["data"])
+                    fields = {}
         finally:
             connection.close()
 
@@ -80,11 +80,11 @@ class Server:
                 return data
         raise AssertionError("the stream ended before the job did")
 
-    def draw(self, **asked: Any) -> dict[str, Any]:
+    def draw(self, **fields: Any) -> dict[str, Any]:
         """A job that is done."""
-        found = self.wait(self.submit(**asked))
-        assert found["state"] == "done", found
-        return found
+        job = self.wait(self.submit(**fields))
+        assert job["state"] == "done", job
+        return job
 
     def memory(self) -> int:
         """Bytes that the process holds in memory."""

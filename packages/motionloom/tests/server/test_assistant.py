@@ -36,9 +36,9 @@ def talk(project: Path, *calls: Call | Callable[[list[Any]], Call]) -> tuple[lis
             listed = await client.list_tools()
             answers: list[Any] = []
             for call in calls:
-                name, given = call(answers) if callable(call) else call
+                name, arguments = call(answers) if callable(call) else call
                 resource = name.startswith("motionloom://")
-                answers.append(await (client.read_resource(name) if resource else client.call_tool(name, given)))
+                answers.append(await (client.read_resource(name) if resource else client.call_tool(name, arguments)))
             return [tool.name for tool in listed.tools], answers
 
     with ThreadPoolExecutor(1) as thread:  # a browser's tests may have a loop running in this one
@@ -48,15 +48,15 @@ def talk(project: Path, *calls: Call | Callable[[list[Any]], Call]) -> tuple[lis
 def plain(answer: Any) -> Any:
     """The JSON of an answer."""
     assert not answer.is_error, answer.content
-    found = answer.structured_content
-    return found["result"] if isinstance(found, dict) and set(found) == {"result"} else found
+    content = answer.structured_content
+    return content["result"] if isinstance(content, dict) and set(content) == {"result"} else content
 
 
 def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
     def long_one(answers: list[Any]) -> str:
         return plain(answers[1])[0]["id"]
 
-    names, (one, long, written, refused, escaped, wrong, actions, goals) = talk(
+    names, (one, long, export, refused, escaped, wrong, actions, goals) = talk(
         tmp_path,
         ("generate_motion", {"prompt": "a person jumps", "seconds": 1.0, "seed": 3, "count": 2}),
         (
@@ -70,15 +70,15 @@ def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
                 }
             },
         ),
-        lambda made: ("export", {"motion": long_one(made), "format": "bvh", "name": "walk-and-wave"}),
+        lambda results: ("export", {"motion": long_one(results), "format": "bvh", "name": "walk-and-wave"}),
         ("export", {"motion": "0" * 16}),
-        lambda made: ("export", {"motion": long_one(made), "name": "../evil"}),
+        lambda results: ("export", {"motion": long_one(results), "name": "../evil"}),
         ("generate_motion", {"prompt": "a person jumps", "best_of": 99}),
         ("motionloom://actions", {}),
         ("motionloom://schemas/goal", {}),
     )
-    said, *_, picture = one.content
-    (did,) = json.loads(said.text)["happened"]
+    text, *_, picture = one.content
+    (did,) = json.loads(text.text)["happened"]
     assert did == plain(one)[0]["happened"][0]
     assert set(did) >= {"sentence", "way", "turn", "steps", "counts", "pelvis", "contacts"}
     assert picture.mime_type == "image/png"
@@ -89,7 +89,7 @@ def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
     assert json.loads(goals.contents[0].text)["title"] == "motionloom goal"
     assert set(names) == {"generate_motion", *REQUESTS, "export"} - {"generate"}
     assert [take["seed"] for take in plain(one)] == [3, 4]
-    file = Path(plain(written)["file"])
+    file = Path(plain(export)["file"])
     assert file == (tmp_path / "exports" / "walk-and-wave.bvh").resolve()
     assert load(file).seconds == pytest.approx(2.0)
     assert "'best_of' must be a whole number from 1 to 16; got 99" in wrong.content[0].text

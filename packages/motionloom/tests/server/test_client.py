@@ -26,14 +26,14 @@ PACKAGE = "a_client_of_motionloom"
 class Client:
     """The package that was made, and its operations by their names."""
 
-    def __init__(self, made: ModuleType, server: Server) -> None:
+    def __init__(self, package: ModuleType, server: Server) -> None:
         self.models, self.types = (importlib.import_module(f"{PACKAGE}.{name}") for name in ("models", "types"))
-        self._client = made.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=300)
+        self._client = package.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=300)
 
     def __getattr__(self, operation: str) -> Callable[..., Any]:
         """What an operation's answer holds, as the client's own classes."""
-        found = importlib.import_module(f"{PACKAGE}.api.default.{operation}")
-        return lambda *given, **named: found.sync(*given, client=self._client, **named)
+        module = importlib.import_module(f"{PACKAGE}.api.default.{operation}")
+        return lambda *arguments, **named: module.sync(*arguments, client=self._client, **named)
 
     def file(self, data: bytes) -> Any:
         return self.types.File(payload=BytesIO(data))
@@ -47,10 +47,10 @@ def client(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator
     (folder / "config.json").write_text(json.dumps({"post_hooks": []}))
     command = [sys.executable, "-m", "openapi_python_client", "generate", "--meta", "none", "--fail-on-warning"]
     command += ["--path", str(folder / "openapi.json"), "--config", str(folder / "config.json")]
-    done = subprocess.run(
+    process = subprocess.run(
         [*command, "--output-path", str(folder / PACKAGE)], capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert process.returncode == 0, process.stdout + process.stderr
     sys.path.insert(0, str(folder))
     yield Client(importlib.import_module(PACKAGE), server)
     sys.path.remove(str(folder))
@@ -72,9 +72,9 @@ def test_the_client_asks_for_motion_and_gets_it(client: Client) -> None:
     assert client.get_health().ok is True
     assert "generate" in client.get_capabilities().tasks
     body = models.GenerateRequest(task="generate", prompt="a person walks", seconds=1.0, steps=2, seed=3)
-    made = client.create_job(body=body)
-    assert isinstance(made, models.NewJob)
-    while (job := client.get_job(made.id)).state in (models.JobState.QUEUED, models.JobState.RUNNING):
+    answer = client.create_job(body=body)
+    assert isinstance(answer, models.NewJob)
+    while (job := client.get_job(answer.id)).state in (models.JobState.QUEUED, models.JobState.RUNNING):
         sleep(0.05)
     assert job.state is models.JobState.DONE
     (result,) = job.results
@@ -83,7 +83,7 @@ def test_the_client_asks_for_motion_and_gets_it(client: Client) -> None:
     assert decoded(motion.people[0].root, 20, 3).shape == (20, 3)
     bvh = client.export_motion(result.id, models.MotionFormat.BVH, skeleton="mixamo")
     assert bvh.payload.read().startswith(b"HIERARCHY")
-    assert "event: done" in client.follow_job(made.id)
+    assert "event: done" in client.follow_job(answer.id)
 
 
 def test_the_client_sends_files_and_timelines(client: Client, tmp_path: Path) -> None:
@@ -97,8 +97,8 @@ def test_the_client_sends_files_and_timelines(client: Client, tmp_path: Path) ->
     assert text.startswith("segments:\n")
     again = client.timeline_to_json(body=client.file(text.encode()))
     assert again.to_dict() == timeline.to_dict()
-    made = client.create_job(body=models.ComposeRequest(task="compose", timeline=timeline, steps=2))
-    assert client.cancel_job(made.id).state is models.JobState.CANCELLED
+    answer = client.create_job(body=models.ComposeRequest(task="compose", timeline=timeline, steps=2))
+    assert client.cancel_job(answer.id).state is models.JobState.CANCELLED
 
 
 def test_the_client_gets_sentences_for_mistakes(client: Client) -> None:

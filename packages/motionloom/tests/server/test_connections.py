@@ -19,21 +19,21 @@ TOKEN = "a-token-for-tests"
 
 
 @contextmanager
-def opened(server: Server, count: int, said: bytes) -> Iterator[list[socket.socket]]:
+def opened(server: Server, count: int, request: bytes) -> Iterator[list[socket.socket]]:
     """So many connections, of which each has said so much."""
     with ExitStack() as stack:
-        found = []
+        sockets = []
         for _ in range(count):
             one = stack.enter_context(socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE))
-            one.sendall(said)
-            found.append(one)
-        yield found
+            one.sendall(request)
+            sockets.append(one)
+        yield sockets
 
 
-def answered(server: Server, said: bytes) -> bytes:
+def answered(server: Server, request: bytes) -> bytes:
     """The status that a request gets; a moment passes first."""
     sleep(0.1)
-    with opened(server, 1, said) as (one,):
+    with opened(server, 1, request) as (one,):
         return one.recv(12)[9:]
 
 
@@ -41,8 +41,8 @@ def answered(server: Server, said: bytes) -> bytes:
 def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server with a token and few places: 16 requests at once, of which 8 are left for who holds the token."""
     limits = {"connections": 16, "reserve": 8, "header_seconds": 2.0, "stuck_seconds": 2.0, "streams": 6}
-    with running(tmp_path_factory.mktemp("project"), "--token", TOKEN, **limits) as found:
-        yield found
+    with running(tmp_path_factory.mktemp("project"), "--token", TOKEN, **limits) as instance:
+        yield instance
 
 
 def test_six_hundred_unfinished_requests_turn_nobody_away(server: Server) -> None:
@@ -51,9 +51,9 @@ def test_six_hundred_unfinished_requests_turn_nobody_away(server: Server) -> Non
         assert server.json("GET", "/capabilities")[0] == 200
 
 
-@pytest.mark.parametrize("said", [b"", UNFINISHED, b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET"])
-def test_whoever_does_not_finish_a_request_is_closed(small: Server, said: bytes) -> None:
-    with opened(small, 3, said) as connections:
+@pytest.mark.parametrize("message", [b"", UNFINISHED, b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET"])
+def test_whoever_does_not_finish_a_request_is_closed(small: Server, message: bytes) -> None:
+    with opened(small, 3, message) as connections:
         for one in connections:
             while one.recv(1 << 16):
                 pass  # until the end, which comes though nothing more is said
@@ -62,22 +62,22 @@ def test_whoever_does_not_finish_a_request_is_closed(small: Server, said: bytes)
 def test_an_answer_that_nobody_takes_ends(small: Server) -> None:
     """Streams of a job that fill every buffer on their way; afterwards there is room for as many again."""
     header = {"Authorization": f"Bearer {TOKEN}"}
-    asked = {"task": "generate", "prompt": "a person walks", "seconds": 30.0, "count": 8, "steps": 200}
-    job = small.json("POST", "/jobs", asked, headers=header)[1]["id"]
-    said = f"GET /jobs/{job}/events?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
-    with opened(small, 6, said) as connections:
+    fields = {"task": "generate", "prompt": "a person walks", "seconds": 30.0, "count": 8, "steps": 200}
+    job = small.json("POST", "/jobs", fields, headers=header)[1]["id"]
+    request = f"GET /jobs/{job}/events?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+    with opened(small, 6, request) as connections:
         for one in connections:
             assert one.recv(12) == b"HTTP/1.1 200"
         status, answer = small.json("GET", f"/jobs/{job}/events?token={TOKEN}")
         assert (status, "6 event streams are open" in answer["error"]) == (503, True)
-        assert any(answered(small, said) == b"200" for _ in range(600)), "their places are free again"
+        assert any(answered(small, request) == b"200" for _ in range(600)), "their places are free again"
     small.json("DELETE", f"/jobs/{job}", headers=header)
 
 
 def test_a_burst_of_three_hundred_streams_gets_as_many_as_the_limit(server: Server) -> None:
     job = server.submit(task="generate", prompt="a person walks", seconds=10.0, count=8, steps=200)
-    said = f"GET /jobs/{job}/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
-    with opened(server, 300, said) as connections:
+    request = f"GET /jobs/{job}/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+    with opened(server, 300, request) as connections:
         answers = Counter(one.recv(12)[9:] for one in connections)
         status, answer = server.json("DELETE", f"/jobs/{job}")
     assert answers == {b"200": 128, b"503": 172}
@@ -89,8 +89,8 @@ def test_who_holds_the_token_is_answered_while_others_take_every_place_they_can(
     large = max(small_page(), key=lambda path: path.stat().st_size)
     if large.stat().st_size < 1 << 19:
         pytest.skip("the page is not built (make page)")
-    said = f"GET /assets/{large.name} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
-    with opened(small, 40, said):
+    request = f"GET /assets/{large.name} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+    with opened(small, 40, request):
         assert small.json("GET", "/capabilities", headers={"Authorization": f"Bearer {TOKEN}"})[0] == 200
 
 

@@ -20,14 +20,14 @@ UNTOLD = {"/openapi.json", "/docs", "/"}
 
 
 def test_every_route_is_told_of_and_nothing_else() -> None:
-    told = {(path, method) for path, methods in document(Limits())["paths"].items() for method in methods}
+    listed = {(path, method) for path, methods in document(Limits())["paths"].items() for method in methods}
     there = {
         (route.path.replace("{name}", "{id}"), method.lower())
         for route in routes(page=False)
         if isinstance(route, Route) and route.path not in UNTOLD
         for method in (route.methods or ()) - {"HEAD"}
     }
-    assert told == there | {("/motions/{id}.{format}", "get")}
+    assert listed == there | {("/motions/{id}.{format}", "get")}
 
 
 def test_every_task_has_its_keys() -> None:
@@ -40,9 +40,9 @@ def test_every_task_has_its_keys() -> None:
 
 
 def test_references_lead_somewhere() -> None:
-    found = document(Limits())
-    names = re.findall(r"#/components/schemas/(\w+)", str(found))
-    assert set(names) == set(found["components"]["schemas"])
+    api = document(Limits())
+    names = re.findall(r"#/components/schemas/(\w+)", str(api))
+    assert set(names) == set(api["components"]["schemas"])
 
 
 def _inside(schema: Any) -> Iterator[dict[str, Any]]:
@@ -63,11 +63,11 @@ def _inside(schema: Any) -> Iterator[dict[str, Any]]:
 
 def test_every_object_and_every_choice_has_a_name_of_its_own() -> None:
     """Programs that make clients call classes by these names; what has none gets one that may be another's."""
-    found = document(Limits())
-    assert all(re.fullmatch(r"[A-Z][A-Za-z]+", name) for name in found["components"]["schemas"])
-    for schema in found["components"]["schemas"].values():
+    api = document(Limits())
+    assert all(re.fullmatch(r"[A-Z][A-Za-z]+", name) for name in api["components"]["schemas"])
+    for schema in api["components"]["schemas"].values():
         assert not [part for part in _inside(schema) if part.get("type") == "object" or "enum" in part]
-    operations = [one for methods in found["paths"].values() for one in methods.values()]
+    operations = [one for methods in api["paths"].values() for one in methods.values()]
     assert not [part for one in operations for part in _inside(one) if part.get("type") == "object" or "enum" in part]
     names = [one["operationId"] for one in operations]
     assert len(names) == len(set(names))
@@ -84,7 +84,7 @@ def test_files_go_as_bytes() -> None:
 
 
 def test_the_page_shows_every_path_and_loads_nothing() -> None:
-    found = document(Limits())
-    page = as_page(found)
-    assert all(path in page for path in found["paths"])
+    api = document(Limits())
+    page = as_page(api)
+    assert all(path in page for path in api["paths"])
     assert not re.search(r"(src|href)=[\"']?(https?:)?//", page)

@@ -37,8 +37,8 @@ def fetched(server: Server, path: str, place: Path) -> Path:
 
 
 def places(server: Server, motion: str) -> np.ndarray:
-    _, found = server.json("GET", f"/motions/{motion}")
-    return decoded(found["people"][0]["positions"], found["frames"], 22, 3)
+    _, motion_json = server.json("GET", f"/motions/{motion}")
+    return decoded(motion_json["people"][0]["positions"], motion_json["frames"], 22, 3)
 
 
 @pytest.mark.parametrize("kind", ["bvh", "glb", "npz"])
@@ -57,14 +57,14 @@ def test_pictures_and_films_are_what_they_are_called(server: Server, walk: str) 
 
 
 def test_rotations_and_root_give_the_places(server: Server, walk: str) -> None:
-    _, found = server.json("GET", f"/motions/{walk}")
-    (person,) = found["people"]
-    turns = decoded(person["rotations"], found["frames"], 22, 4).astype(np.float64)
-    root = decoded(person["root"], found["frames"], 3).astype(np.float64)
+    _, motion_json = server.json("GET", f"/motions/{walk}")
+    (person,) = motion_json["people"]
+    turns = decoded(person["rotations"], motion_json["frames"], 22, 4).astype(np.float64)
+    root = decoded(person["root"], motion_json["frames"], 3).astype(np.float64)
     _, about = server.json("GET", "/capabilities")
     assert about["joints"] == list(SMPL22.names)
     assert np.allclose(about["offsets"], SMPL22.offsets)
-    again = Motion(SMPL22, found["fps"], root, turns / np.linalg.norm(turns, axis=-1, keepdims=True))
+    again = Motion(SMPL22, motion_json["fps"], root, turns / np.linalg.norm(turns, axis=-1, keepdims=True))
     assert np.abs(again.positions() - places(server, walk)).max() < 1e-4
 
 
@@ -81,8 +81,8 @@ def test_the_way_is_carried_by_what_is_asked(tmp_path: Path) -> None:
     stored = project.add((Motion(SMPL22, 20, root, np.tile([1.0, 0, 0, 0], (40, 22, 1))),), {})
     ways = {}
     for mode in (*ROOTS, None):
-        asked = Export(motion=stored.id, format="npz", skeleton="unreal", root=mode)
-        back = load(export(project, asked))
+        options = Export(motion=stored.id, format="npz", skeleton="unreal", root=mode)
+        back = load(export(project, options))
         where = back.positions()[:, [back.skeleton.index(name) for name in ("root", "pelvis")]]
         ways[mode] = np.linalg.norm((where[-1] - where[0])[:, [0, 2]], axis=-1)
     assert ways["motion"].min() > 1.5
@@ -115,10 +115,10 @@ def test_a_page_plays_it_with_a_character_of_ones_own_if_asked(tmp_path: Path, m
     own = project.add_character(Hero().write(project.part(".glb")), "hero.glb", ".glb")
     for skeleton, person, people in ((None, None, 2), (None, 1, 1), ("mixamo", None, 2), (own, None, 2), (own, 0, 1)):
         file = export(project, Export(motion=stored.id, format="html", skeleton=skeleton, person=person))
-        given = Reader(file.read_text()).given
-        [take] = given["takes"]
+        content = Reader(file.read_text()).given
+        [take] = content["takes"]
         assert (take["name"], len(take["people"])) == ("two <people>", people)
-        assert (given["character"] is not None) == (skeleton == own)
+        assert (content["character"] is not None) == (skeleton == own)
 
 
 def test_both_people_of_a_duet_are_in_one_file_or_alone(server: Server, tmp_path: Path) -> None:
@@ -133,13 +133,13 @@ def test_a_file_that_is_sent_can_be_drawn_from(server: Server, walk: str, tmp_pa
     data = fetched(server, f"/motions/{walk}.bvh", tmp_path / "walk.bvh").read_bytes()
     status, sent = server.json("POST", "/motions?name=my%20walk.bvh", data)
     assert (status, sent["frames"], sent["people"], sent["fps"]) == (201, 40, 1, 20.0)
-    made = server.draw(task="predict", motion=sent["id"], seconds=0.5, count=1)
-    assert made["results"][0]["frames"] == 50
+    job = server.draw(task="predict", motion=sent["id"], seconds=0.5, count=1)
+    assert job["results"][0]["frames"] == 50
 
 
 def test_what_a_page_was_given_it_can_send_back(server: Server, walk: str) -> None:
-    _, found = server.json("GET", f"/motions/{walk}")
-    status, sent = server.json("POST", "/motions?name=live.json", found)
+    _, motion_json = server.json("GET", f"/motions/{walk}")
+    status, sent = server.json("POST", "/motions?name=live.json", motion_json)
     assert (status, sent["frames"], sent["people"], sent["name"]) == (201, 40, 1, "live.json")
     assert np.abs(places(server, sent["id"]) - places(server, walk)).max() < 1e-4
 
@@ -167,7 +167,7 @@ def test_a_character_moves_where_it_stands(server: Server, walk: str, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("name", "data", "said"),
+    ("name", "data", "sentence"),
     [
         ("walk.exe", b"x", "ending in"),
         ("", b"x", "ending in"),
@@ -182,10 +182,10 @@ def test_a_character_moves_where_it_stands(server: Server, walk: str, tmp_path: 
         ("live.json", b'{"fps": 20, "people": [{"root": "", "rotations": "AAAA"}]}', "base64 of float32"),
     ],
 )
-def test_a_broken_file_is_refused_with_one_sentence(server: Server, name: str, data: bytes, said: str) -> None:
+def test_a_broken_file_is_refused_with_one_sentence(server: Server, name: str, data: bytes, sentence: str) -> None:
     status, answer = server.json("POST", f"/motions?name={name}", data)
     assert status == 400
-    assert said in answer["error"]
+    assert sentence in answer["error"]
     assert str(server.project) not in answer["error"]
     assert not list((server.project / "temporary").iterdir())
 
@@ -213,11 +213,11 @@ def test_joints_that_nobody_can_guess_are_named_and_kept(server: Server, walk: s
     wrong = quote(json.dumps({"left_hip": "nobody"}))
     assert "nobody" in server.json("POST", f"/characters?name=odd.glb&joints={wrong}", data)[1]["error"]
     assert server.json("POST", "/characters?name=odd.glb&joints=5", data)[0] == 400
-    said = quote(json.dumps(names))
-    status, taken = server.json("POST", f"/characters?name=odd.glb&joints={said}", data)
-    assert status == 201, taken
-    assert taken["joints"]["left_knee"] == [names["left_knee"]]
-    status, _, moving = server.ask("GET", f"/motions/{walk}.glb?skeleton={taken['id']}")
+    joints = quote(json.dumps(names))
+    status, entry = server.json("POST", f"/characters?name=odd.glb&joints={joints}", data)
+    assert status == 201, entry
+    assert entry["joints"]["left_knee"] == [names["left_knee"]]
+    status, _, moving = server.ask("GET", f"/motions/{walk}.glb?skeleton={entry['id']}")
     assert status == 200
     (tmp_path / "moving.glb").write_bytes(moving)
     character = load_character(tmp_path / "moving.glb", joint_map=names)
@@ -268,23 +268,23 @@ def test_exports_leave_nothing_behind_even_while_they_are_sent(server: Server, w
 
 
 def test_an_unknown_format_or_skeleton_is_refused(server: Server, walk: str) -> None:
-    for path, said in (
+    for path, sentence in (
         (f"/motions/{walk}.fbx", "motions are given as"),
         (f"/motions/{walk}.bvh?skeleton=x", "no such"),
     ):
         status, answer = server.json("GET", path)
         assert status == 404
-        assert said in answer["error"]
+        assert sentence in answer["error"]
 
 
 def test_bytes_say_where_everybody_looks(server: Server, walk: str) -> None:
-    _, seen = server.json("GET", f"/motions/{walk}")
-    frames, ahead = seen["frames"], decoded(seen["people"][0]["looks"], seen["frames"], 3)
+    _, motion_json = server.json("GET", f"/motions/{walk}")
+    frames, ahead = motion_json["frames"], decoded(motion_json["people"][0]["looks"], motion_json["frames"], 3)
     status, _, data = server.ask("GET", f"/motions/{walk}?looks=true", headers={"Accept": "application/octet-stream"})
     assert status == 200
-    found = np.frombuffer(data, "<f4")
-    assert np.array_equal(found[: frames * 66].reshape(frames, 22, 3), places(server, walk))
-    assert np.array_equal(found[frames * 66 :].reshape(frames, 3), ahead)
+    numbers = np.frombuffer(data, "<f4")
+    assert np.array_equal(numbers[: frames * 66].reshape(frames, 22, 3), places(server, walk))
+    assert np.array_equal(numbers[frames * 66 :].reshape(frames, 3), ahead)
     assert np.allclose(np.linalg.norm(ahead, axis=-1), 1.0, atol=1e-6)
     way = places(server, walk)[-1, 0] - places(server, walk)[0, 0]
     assert (ahead @ (way / np.linalg.norm(way))).min() > 0.6, "who walks looks ahead"

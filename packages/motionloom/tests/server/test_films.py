@@ -20,9 +20,9 @@ SMALL = {"format": "gif", "width": 96, "height": 64, "fps": 20, "count": 5}
 
 
 @contextmanager
-def _open(server: Server, **asked: Any) -> Iterator[Any]:
+def _open(server: Server, **fields: Any) -> Iterator[Any]:
     with client.connect(f"ws://127.0.0.1:{server.port}/film") as socket:
-        socket.send(json.dumps(SMALL | asked))
+        socket.send(json.dumps(SMALL | fields))
         yield socket
 
 
@@ -42,9 +42,9 @@ def _left(server: Server) -> list[str]:
     return [path.name for path in server.project.rglob("*") if path.suffix in (".gif", ".mp4", ".part")]
 
 
-def _filmed(server: Server, **asked: Any) -> bytes:
+def _filmed(server: Server, **fields: Any) -> bytes:
     """The file of five pictures, each in two pieces."""
-    with _open(server, **asked) as socket:
+    with _open(server, **fields) as socket:
         for number in range(5):
             assert _hear(socket) == {"done": number}
             data = _picture(number)
@@ -94,7 +94,7 @@ def test_what_is_no_picture_of_the_film_is_reported(server: Server) -> None:
 
 def test_a_gif_takes_no_more_than_its_share_of_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     class Pictures(list[bytes]):
-        asked = films.Asked("gif", (96, 64), 20, 2)
+        film = films.Film("gif", (96, 64), 20, 2)
 
     sent = Pictures([_picture(0)[4:]] * 2)
     monkeypatch.setattr(films, "MAX_GIF_BYTES", len(sent[0]))

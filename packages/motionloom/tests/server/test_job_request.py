@@ -41,17 +41,17 @@ KNOWN = st.sampled_from(sorted({key for request in REQUESTS.values() for key in 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(task=st.sampled_from(sorted(REQUESTS)), more=st.dictionaries(KNOWN, JSON, max_size=5))
 def test_any_json_is_a_request_or_one_sentence(project: Project, task: str, more: dict[str, Any]) -> None:
-    found: JobRequest | MotionloomError | Refusal
+    outcome: JobRequest | MotionloomError | Refusal
     try:
-        found = read_request({"task": task} | more, project, Limits())
+        outcome = read_request({"task": task} | more, project, Limits())
     except (MotionloomError, Refusal) as error:
-        found = error
-    if isinstance(found, JobRequest):
-        assert 1 <= found.count <= Limits().count
-    elif isinstance(found, Refusal):
-        assert 400 <= found.status < 500
+        outcome = error
+    if isinstance(outcome, JobRequest):
+        assert 1 <= outcome.count <= Limits().count
+    elif isinstance(outcome, Refusal):
+        assert 400 <= outcome.status < 500
     else:
-        assert "\n" not in str(found)
+        assert "\n" not in str(outcome)
 
 
 WORDS = st.text(min_size=1, max_size=30).filter(lambda text: text.strip() and text.isprintable())

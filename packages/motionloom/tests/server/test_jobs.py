@@ -13,16 +13,16 @@ PATH = {"path": {"points": [[0, 0], [0.5, 1], [0, 2]]}}
 
 
 def poses(server: Server, motion: str, person: int = 0) -> np.ndarray:
-    status, found = server.json("GET", f"/motions/{motion}")
+    status, motion_json = server.json("GET", f"/motions/{motion}")
     assert status == 200
-    return decoded(found["people"][person]["positions"], found["frames"], 22, 3)
+    return decoded(motion_json["people"][person]["positions"], motion_json["frames"], 22, 3)
 
 
 def test_a_generated_motion_is_that_of_the_library_with_the_same_seed(server: Server) -> None:
-    made = server.draw(task="generate", prompt="a person jumps", seconds=2.0, seed=5, count=2, steps=6)
-    assert [one["seed"] for one in made["results"]] == [5, 6]
+    job = server.draw(task="generate", prompt="a person jumps", seconds=2.0, seed=5, count=2, steps=6)
+    assert [one["seed"] for one in job["results"]] == [5, 6]
     expected = generate(Prior.load(), "a person jumps", seconds=2.0, seed=5, count=2, steps=6)
-    for one, motion in zip(made["results"], expected, strict=True):
+    for one, motion in zip(job["results"], expected, strict=True):
         assert np.abs(poses(server, one["id"]) - motion.positions()).max() < 1e-3
 
 
@@ -39,9 +39,9 @@ def test_every_level_arrives_in_order_and_ends_at_the_motion(server: Server) -> 
 
 
 def test_every_third_level_arrives_where_that_is_asked_and_none_where_none_is(server: Server) -> None:
-    asked = {"task": "generate", "prompt": "a person walks", "seconds": 1.0, "steps": 7}
+    fields = {"task": "generate", "prompt": "a person walks", "seconds": 1.0, "steps": 7}
     for levels, expected in ((3, [3, 6]), (False, [])):
-        job = server.submit(**asked, levels=levels)
+        job = server.submit(**fields, levels=levels)
         assert [data["level"] for _, kind, data in server.events(job) if kind == "level"] == expected
 
 
@@ -63,12 +63,12 @@ def test_a_sentence_of_two_actions_is_parted_as_on_the_command_line(server: Serv
 
 
 def test_numbers_in_the_words_are_kept_and_measured_as_on_the_command_line(server: Server) -> None:
-    made = server.draw(task="generate", prompt="turn left 90 degrees", seed=5, steps=6)
-    (result,) = made["results"]
+    job = server.draw(task="generate", prompt="turn left 90 degrees", seed=5, steps=6)
+    (result,) = job["results"]
     expected = generate(Prior.load(), "turn left 90 degrees", seed=5, steps=6)[0]
     assert np.abs(poses(server, result["id"]) - expected.positions()).max() < 1e-3
     assert [one["read"] for one in result["measures"]["amounts"]] == ["a turn of 90 degrees to the left"]
-    assert made["remarks"][0].startswith("read as: a turn of 90 degrees to the left, ")
+    assert job["remarks"][0].startswith("read as: a turn of 90 degrees to the left, ")
     (did,) = result["happened"]
     assert did["turn"] == pytest.approx(result["measures"]["amounts"][0]["measured"], abs=15)
     assert "turns" in did["sentence"]
@@ -81,9 +81,9 @@ def test_numbers_in_the_words_are_kept_and_measured_as_on_the_command_line(serve
 
 def test_words_that_nobody_learned_are_remarked_on(server: Server) -> None:
     foreign = "eine Person geht vorwärts"
-    for asked in ({"task": "generate", "prompt": foreign, "seconds": 1.0}, {"task": "duet", "prompt": foreign}):
-        made = server.draw(**asked | {"seconds": 1.0, "steps": 2})
-        assert any("does not look like English" in line for line in made["remarks"])
+    for fields in ({"task": "generate", "prompt": foreign, "seconds": 1.0}, {"task": "duet", "prompt": foreign}):
+        job = server.draw(**fields | {"seconds": 1.0, "steps": 2})
+        assert any("does not look like English" in line for line in job["remarks"])
     plain = server.draw(task="generate", prompt="a person walks", seconds=1.0, steps=2)
     assert plain["remarks"] == plain["notes"] == []
 
@@ -91,11 +91,11 @@ def test_words_that_nobody_learned_are_remarked_on(server: Server) -> None:
 def test_remarks_name_their_words_and_sentences_that_are_known(server: Server) -> None:
     words, foreign = "vacuuming the living room", "eine Person geht vorwärts"
     timeline = {"segments": [{"text": text, "seconds": 1.0} for text in ("a person walks", words, foreign, words)]}
-    made = server.draw(task="compose", timeline=timeline, steps=2)
-    assert [note["text"] for note in made["notes"]] == [foreign, words]
-    assert [note["line"] for note in made["notes"]] == made["remarks"]
-    assert [len(note["instead"]) for note in made["notes"]] == [0, 3]
-    instead = made["notes"][1]["instead"][0]
+    job = server.draw(task="compose", timeline=timeline, steps=2)
+    assert [note["text"] for note in job["notes"]] == [foreign, words]
+    assert [note["line"] for note in job["notes"]] == job["remarks"]
+    assert [len(note["instead"]) for note in job["notes"]] == [0, 3]
+    instead = job["notes"][1]["instead"][0]
     again = server.draw(task="generate", prompt=instead, seconds=1.0, steps=2)
     assert again["notes"] == []
 
@@ -116,30 +116,30 @@ def test_what_happens_between_two_times_is_measured(server: Server) -> None:
 
 
 def test_the_best_of_several_is_that_of_the_library(server: Server) -> None:
-    made = server.draw(task="generate", prompt="a person jumps", seconds=1.0, seed=5, best_of=3, steps=6)
+    job = server.draw(task="generate", prompt="a person jumps", seconds=1.0, seed=5, best_of=3, steps=6)
     (expected,) = generate(Prior.load(), "a person jumps", seconds=1.0, seed=5, best_of=3, steps=6)
-    assert np.abs(poses(server, made["results"][0]["id"]) - expected.positions()).max() < 1e-3
+    assert np.abs(poses(server, job["results"][0]["id"]) - expected.positions()).max() < 1e-3
 
 
 def test_a_loop_begins_as_it_ends_and_its_last_frames_are_seen_as_no_level(server: Server) -> None:
-    asked = {"task": "generate", "prompt": "a person waves", "seconds": 3.0, "seed": 3, "steps": 6}
-    job = server.submit(**asked, loop=True)
+    fields = {"task": "generate", "prompt": "a person waves", "seconds": 3.0, "seed": 3, "steps": 6}
+    job = server.submit(**fields, loop=True)
     events = list(server.events(job))
     assert [data["level"] for _, kind, data in events if kind == "level"] == [1, 2, 3, 4, 5, 6]
-    closed, free = (poses(server, one) for one in (_made(events[-1][2]), _made(server.draw(**asked))))
+    closed, free = (poses(server, one) for one in (_motion_of(events[-1][2]), _motion_of(server.draw(**fields))))
     assert np.abs(closed[:30] - free[:30]).max() < 1e-3
     ends = [np.linalg.norm((one[-1] - one[-1, 0]) - (one[0] - one[0, 0]), axis=-1).mean() for one in (closed, free)]
     assert ends[0] < 0.5 * ends[1]
 
 
-def _made(job: dict[str, Any]) -> str:
+def _motion_of(job: dict[str, Any]) -> str:
     return job["results"][0]["id"]
 
 
 def test_compose_follows_the_path_of_its_timeline(server: Server) -> None:
     timeline = {"segments": [{"text": "a person walks", "seconds": 2}] * 2, "path": PATH, "seed": 4}
-    made = server.draw(task="compose", timeline=timeline, steps=6)
-    (result,) = made["results"]
+    job = server.draw(task="compose", timeline=timeline, steps=6)
+    (result,) = job["results"]
     assert (result["seed"], result["frames"]) == (4, 80)
     assert result["measures"]["goals"]["path"]["mean_cm"] < 3
     assert np.abs(poses(server, result["id"])[-1, 0, [0, 2]] - [0, 2]).max() < 0.1
@@ -151,7 +151,7 @@ def _three(*words: str) -> dict[str, Any]:
 
 def test_a_changed_block_is_drawn_again_and_the_others_keep_their_frames(server: Server) -> None:
     first, other = _three("a person walks", "a person waves", "a person jumps"), "a person kicks"
-    old = _made(server.draw(task="compose", timeline=first, steps=6))
+    old = _motion_of(server.draw(task="compose", timeline=first, steps=6))
     changed = _three("a person walks", "a person waves", other)
     job = server.submit(task="compose", timeline=changed, steps=6, kept_from=old, levels=2)
     events = list(server.events(job))
@@ -168,10 +168,10 @@ def test_a_changed_block_is_drawn_again_and_the_others_keep_their_frames(server:
 
 def test_where_no_block_is_the_same_all_is_drawn_as_without_an_old_motion(server: Server, walk: str) -> None:
     timeline = _three("a person walks", "a person waves")
-    plain = _made(server.draw(task="compose", timeline=timeline, steps=6))
-    seed = _made(server.draw(task="compose", timeline=timeline, steps=6, seed=5))
-    for kept in (walk, seed):
-        (result,) = server.draw(task="compose", timeline=timeline, steps=6, kept_from=kept)["results"]
+    plain = _motion_of(server.draw(task="compose", timeline=timeline, steps=6))
+    seed = _motion_of(server.draw(task="compose", timeline=timeline, steps=6, seed=5))
+    for source in (walk, seed):
+        (result,) = server.draw(task="compose", timeline=timeline, steps=6, kept_from=source)["results"]
         assert "redrawn" not in result["measures"]
         assert np.array_equal(poses(server, result["id"]), poses(server, plain))
     status, _ = server.json("POST", "/jobs", {"task": "compose", "timeline": timeline, "kept_from": "0" * 16})
@@ -180,8 +180,8 @@ def test_where_no_block_is_the_same_all_is_drawn_as_without_an_old_motion(server
 
 def test_control_measures_each_goal_and_names_what_is_missed(server: Server) -> None:
     far = {"joint": "left_wrist", "points": [{"time": 1.0, "position": [0.4, 1.2, 1.0]}]}
-    made = server.draw(task="control", prompt="a person walks", seconds=2.0, steps=6, goals={**PATH, "joints": [far]})
-    measures = made["results"][0]["measures"]
+    job = server.draw(task="control", prompt="a person walks", seconds=2.0, steps=6, goals={**PATH, "joints": [far]})
+    measures = job["results"][0]["measures"]
     assert set(measures["goals"]) == {"path", "joints[0]"}
     assert measures["goals"]["joints[0]"]["worst_at"] == 1.0
     assert measures["goals"]["path"]["worst_cm"] < 10
@@ -210,9 +210,9 @@ def test_levels_of_a_controlled_motion_stand_in_the_world_of_its_goals(server: S
 
 
 def test_an_edit_keeps_what_is_outside_of_its_stretch(server: Server, walk: str) -> None:
-    made = server.draw(task="edit", motion=walk, prompt="a person waves", between=[[0.5, 1.5]], steps=6, count=2)
+    job = server.draw(task="edit", motion=walk, prompt="a person waves", between=[[0.5, 1.5]], steps=6, count=2)
     before = poses(server, walk)
-    for one in made["results"]:
+    for one in job["results"]:
         after = poses(server, one["id"])
         assert np.abs(after[:10] - before[:10]).max() < 1e-5
         assert np.abs(after[12:28] - before[12:28]).max() > 0.02
@@ -225,22 +225,22 @@ def test_levels_of_an_edit_say_where_in_the_motion_they_begin(server: Server) ->
     [*_, last] = [data for _, kind, data in events if kind == "level"]
     assert 0 < last["begin"] < 6.0
     first = round(last["begin"] * 20)
-    shown = decoded(last["positions"], 1, last["frames"], 22, 3)[0]
+    last_poses = decoded(last["positions"], 1, last["frames"], 22, 3)[0]
     before = poses(server, long["id"])[first : first + 10]
-    assert np.abs(shown[:10] - before).max() < 0.05
+    assert np.abs(last_poses[:10] - before).max() < 0.05
 
 
 def test_futures_begin_with_their_past(server: Server, walk: str) -> None:
-    made = server.draw(task="predict", motion=walk, seconds=1.0, count=3)
-    assert [one["frames"] for one in made["results"]] == [60, 60, 60]
-    for one in made["results"]:
+    job = server.draw(task="predict", motion=walk, seconds=1.0, count=3)
+    assert [one["frames"] for one in job["results"]] == [60, 60, 60]
+    for one in job["results"]:
         assert np.abs(poses(server, one["id"])[:40] - poses(server, walk)).max() < 1e-5
 
 
 def test_a_switch_has_both_motions_and_what_is_between(server: Server, walk: str) -> None:
     (other,) = server.draw(task="generate", prompt="a person waves", seconds=2.0, steps=6)["results"]
-    (made,) = server.draw(task="switch", motion=walk, target=other["id"], seconds=0.5)["results"]
-    assert made["frames"] == 40 + 10 + 40
+    (result,) = server.draw(task="switch", motion=walk, target=other["id"], seconds=0.5)["results"]
+    assert result["frames"] == 40 + 10 + 40
 
 
 @pytest.mark.parametrize("blocks", [1, 2])
@@ -254,13 +254,13 @@ def test_goals_of_both_people_of_a_duet_are_kept(server: Server, blocks: int) ->
         return {"path": path, "joints": [{"joint": "right_wrist", "points": [{"time": 1.5, "position": at}]}]}
 
     first, second = goal(0.0, 0.0, -0.02), goal(0.75, 180.0, 0.02)
-    asked: dict[str, Any] = {"prompt": "two people shake hands", "seconds": seconds, "goals": first}
+    fields: dict[str, Any] = {"prompt": "two people shake hands", "seconds": seconds, "goals": first}
     if blocks == 2:
         segments = [{"text": "two people shake hands", "seconds": seconds / 2}] * 2
-        asked = {"timeline": {"segments": segments, "path": first}}
-    (result,) = server.draw(task="duet", steps=8, other_goals=second, **asked)["results"]
-    _, found = server.json("GET", f"/motions/{result['id']}")
-    wrists = [decoded(one["positions"], -1, 22, 3)[30, 21] for one in found["people"]]
+        fields = {"timeline": {"segments": segments, "path": first}}
+    (result,) = server.draw(task="duet", steps=8, other_goals=second, **fields)["results"]
+    _, motion_json = server.json("GET", f"/motions/{result['id']}")
+    wrists = [decoded(one["positions"], -1, 22, 3)[30, 21] for one in motion_json["people"]]
     assert [float(np.linalg.norm(wrist - place)) for wrist in wrists] == pytest.approx([0.02, 0.02], abs=0.05)
 
 
@@ -337,19 +337,19 @@ BROKEN: list[tuple[Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("body", "said"), BROKEN)
-def test_what_cannot_be_asked_is_answered_with_one_sentence(server: Server, body: Any, said: str) -> None:
+@pytest.mark.parametrize(("body", "sentence"), BROKEN)
+def test_what_cannot_be_asked_is_answered_with_one_sentence(server: Server, body: Any, sentence: str) -> None:
     status, answer = server.json("POST", "/jobs", body)
     assert status in (400, 404)
-    assert said in answer["error"]
+    assert sentence in answer["error"]
     assert str(server.project) not in answer["error"]
 
 
 def test_what_only_the_library_can_refuse_fails_the_job_with_its_sentence(server: Server, walk: str) -> None:
     job = server.submit(task="edit", motion=walk, between=[[1.0, 30.0]], prompt="a person waves")
-    found = server.wait(job)
-    assert (found["state"], found["status"]) == ("failed", 400)
-    assert "no stretch from 1 to 30 s" in found["error"]
+    job_json = server.wait(job)
+    assert (job_json["state"], job_json["status"]) == ("failed", 400)
+    assert "no stretch from 1 to 30 s" in job_json["error"]
 
 
 def test_an_unknown_job_is_404(server: Server) -> None:
@@ -360,15 +360,15 @@ def test_an_unknown_job_is_404(server: Server) -> None:
 
 
 def test_words_of_a_head_are_done_without_a_remark(server: Server, walk: str) -> None:
-    asked = {"task": "edit", "motion": walk, "keep": ["lower_body", "torso", "left_arm", "right_arm"]}
-    made = server.draw(**asked, prompt="nods twice")
-    assert made["remarks"] == []
+    fields = {"task": "edit", "motion": walk, "keep": ["lower_body", "torso", "left_arm", "right_arm"]}
+    job = server.draw(**fields, prompt="nods twice")
+    assert job["remarks"] == []
     first, second = (
         decoded(server.json("GET", f"/motions/{one}")[1]["people"][0]["looks"], 40, 3)
-        for one in (walk, made["results"][0]["id"])
+        for one in (walk, job["results"][0]["id"])
     )
     assert 0.2 < (first - second)[:, 1].max() < 0.5
-    refused = server.wait(server.submit(**asked, prompt="kicks"))
+    refused = server.wait(server.submit(**fields, prompt="kicks"))
     assert (refused["state"], refused["error"].split(";")[0]) == (
         "failed",
         "a head nods, shakes, looks left, right, up or down, and looks around",

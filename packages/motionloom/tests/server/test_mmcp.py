@@ -30,9 +30,9 @@ def model(server: Server) -> dict[str, Any]:
     return client.get_capabilities(url(server))["models"][0]
 
 
-def draw(server: Server, model: dict[str, Any], **asked: Any) -> list[dict[str, Any]]:
+def draw(server: Server, model: dict[str, Any], **fields: Any) -> list[dict[str, Any]]:
     """The samples as the SDK's parser reads them, with ``places`` (frames, joints, 3) of its own rotations."""
-    body = WHOLE | {"skeleton": model["canonical_skeleton"]} | asked
+    body = WHOLE | {"skeleton": model["canonical_skeleton"]} | fields
     samples = client.parse_gltf_samples(client.generate(url(server), body))
     for sample in samples:
         sample["places"] = posed(sample, body["skeleton"]["joints"])
@@ -71,8 +71,8 @@ def test_it_is_found_at_the_root_and_under_its_prefix(server: Server, model: dic
 
 
 def test_its_document_is_given_and_no_page_that_loads_scripts_from_elsewhere(server: Server) -> None:
-    status, found = server.json("GET", "/mmcp/openapi.json")
-    assert (status, "/generate" in found["paths"]) == (200, True)
+    status, api = server.json("GET", "/mmcp/openapi.json")
+    assert (status, "/generate" in api["paths"]) == (200, True)
     assert [server.ask("GET", f"/mmcp/{page}")[0] for page in ("docs", "redoc")] == [404, 404]
 
 
@@ -85,28 +85,28 @@ def test_a_seed_makes_the_same_samples_again_and_each_is_another(server: Server,
 
 def test_segments_add_up_at_any_frame_rate(server: Server, model: dict[str, Any]) -> None:
     segments = [text(frames=60), {"type": "unconditioned", "duration_frames": 47}]
-    (made,) = draw(server, model, segments=segments, timing={"fps": 30})
-    assert (made["num_frames"], made["fps"]) == (107, 30)
+    (motion,) = draw(server, model, segments=segments, timing={"fps": 30})
+    assert (motion["num_frames"], motion["fps"]) == (107, 30)
 
 
 def test_a_path_and_a_hand_are_where_they_were_asked(server: Server, model: dict[str, Any]) -> None:
     path = {"type": "root_path", "frames": [0, 30, 59], "positions_xz": [[1, 0], [1.5, 1], [1, 2]]}
     hand = {"type": "effector_target", "joint": "left_wrist", "frames": [30], "positions": [[1.9, 1.2, 1.2]]}
-    (made,) = draw(server, model, segments=[text(frames=60)], constraints=[path, hand], timing={"fps": 30})
-    assert np.abs(place(made, "pelvis")[[0, 30, 59]][:, [0, 2]] - path["positions_xz"]).max() < 0.03
-    assert np.linalg.norm(place(made, "left_wrist")[30] - [1.9, 1.2, 1.2]) < 0.03
+    (motion,) = draw(server, model, segments=[text(frames=60)], constraints=[path, hand], timing={"fps": 30})
+    assert np.abs(place(motion, "pelvis")[[0, 30, 59]][:, [0, 2]] - path["positions_xz"]).max() < 0.03
+    assert np.linalg.norm(place(motion, "left_wrist")[30] - [1.9, 1.2, 1.2]) < 0.03
 
 
 def test_a_path_leads_through_several_segments(server: Server, model: dict[str, Any]) -> None:
     path = {"type": "root_path", "frames": [0, 79], "positions_xz": [[0, 0], [0, 3]], "heading_radians": [0, 0]}
-    (made,) = draw(server, model, segments=[text(), text("a person jumps")], constraints=[path])
-    assert np.abs(place(made, "pelvis")[-1, [0, 2]] - [0, 3]).max() < 0.05
+    (motion,) = draw(server, model, segments=[text(), text("a person jumps")], constraints=[path])
+    assert np.abs(place(motion, "pelvis")[-1, [0, 2]] - [0, 3]).max() < 0.05
 
 
 def test_constraints_alone_are_enough(server: Server, model: dict[str, Any]) -> None:
     path = {"type": "root_path", "frames": [0, 39], "positions_xz": [[0, 0], [0, 2]]}
-    (made,) = draw(server, model, duration_frames=40, constraints=[path])
-    assert np.abs(place(made, "pelvis")[-1, [0, 2]] - [0, 2]).max() < 0.05
+    (motion,) = draw(server, model, duration_frames=40, constraints=[path])
+    assert np.abs(place(motion, "pelvis")[-1, [0, 2]] - [0, 2]).max() < 0.05
 
 
 def test_a_pose_with_a_place_is_taken_there(server: Server, model: dict[str, Any]) -> None:
@@ -118,9 +118,9 @@ def test_a_pose_with_a_place_is_taken_there(server: Server, model: dict[str, Any
         "joint_rotations": dict(zip(source["joint_names"], turns)),
         "root_position": [0.5, float(place(source, "pelvis")[20, 1]), 1.0],
     }
-    (made,) = draw(server, model, segments=[text(frames=60)], constraints=[pose])
+    (motion,) = draw(server, model, segments=[text(frames=60)], constraints=[pose])
     own = source["places"][20] - place(source, "pelvis")[20]
-    there = made["places"][30] - [0.5, place(source, "pelvis")[20, 1], 1.0]
+    there = motion["places"][30] - [0.5, place(source, "pelvis")[20, 1], 1.0]
     assert np.linalg.norm(own - there, axis=-1).mean() < 0.06
 
 
@@ -129,32 +129,32 @@ def test_a_pose_without_a_place_is_taken_where_the_person_is(server: Server, mod
     turns = dict(zip(source["joint_names"], xyzw(source["local_rot_mats"][20])))
     pose = {"type": "pose_keyframe", "frame": 30, "joint_rotations": turns}
     (free,) = draw(server, model, segments=[text(frames=60)])
-    (made,) = draw(server, model, segments=[text(frames=60)], constraints=[pose])
-    raised, wanted = (
-        place(one, "left_wrist")[at, 1] - place(one, "pelvis")[at, 1] for one, at in ((made, 30), (source, 20))
+    (motion,) = draw(server, model, segments=[text(frames=60)], constraints=[pose])
+    raised, target = (
+        place(one, "left_wrist")[at, 1] - place(one, "pelvis")[at, 1] for one, at in ((motion, 30), (source, 20))
     )
-    assert raised == pytest.approx(wanted, abs=0.15)
-    assert np.linalg.norm(place(made, "pelvis")[30] - place(free, "pelvis")[30]) < 0.5
+    assert raised == pytest.approx(target, abs=0.15)
+    assert np.linalg.norm(place(motion, "pelvis")[30] - place(free, "pelvis")[30]) < 0.5
 
 
 def test_a_pose_segment_is_one_frame(server: Server, model: dict[str, Any]) -> None:
-    (made,) = draw(server, model, segments=[{"type": "pose", "prompt": "a person raises both arms"}])
-    assert made["num_frames"] == 1
+    (motion,) = draw(server, model, segments=[{"type": "pose", "prompt": "a person raises both arms"}])
+    assert motion["num_frames"] == 1
 
 
 def test_a_loop_ends_as_it_begins(server: Server, model: dict[str, Any]) -> None:
-    (made,) = draw(server, model, segments=[text(frames=60)], options={**QUICK, "loop": True})
-    turns = np.asarray(made["local_rot_mats"])
+    (motion,) = draw(server, model, segments=[text(frames=60)], options={**QUICK, "loop": True})
+    turns = np.asarray(motion["local_rot_mats"])
     assert np.abs(turns[0, 1:] - turns[-1, 1:]).max() < 1e-3
-    assert place(made, "pelvis")[-1, 1] == pytest.approx(place(made, "pelvis")[0, 1], abs=1e-4)
+    assert place(motion, "pelvis")[-1, 1] == pytest.approx(place(motion, "pelvis")[0, 1], abs=1e-4)
 
 
 def test_planted_feet_stand_on_the_ground_under_them(server: Server, model: dict[str, Any]) -> None:
     points = [[x / 4, z / 4, 0.4 if z > 3 else 0.0] for x in range(-6, 7) for z in range(-6, 20)]
     segments = [text(frames=60)]
     (flat,) = draw(server, model, segments=segments)
-    (made,) = draw(server, model, segments=segments, constraints=[{"type": "ground_height", "points": points}])
-    raised = np.minimum(place(made, "left_foot")[:, 1], place(made, "right_foot")[:, 1])
+    (motion,) = draw(server, model, segments=segments, constraints=[{"type": "ground_height", "points": points}])
+    raised = np.minimum(place(motion, "left_foot")[:, 1], place(motion, "right_foot")[:, 1])
     before = np.minimum(place(flat, "left_foot")[:, 1], place(flat, "right_foot")[:, 1])
     far = place(flat, "pelvis")[:, 2] > 1.6
     assert far.any()
@@ -172,11 +172,11 @@ def test_a_performance_is_like_its_reference_but_no_copy(server: Server, model: 
         "rotations": [xyzw(frame) for frame in source["local_rot_mats"]],
         "root_positions": place(source, "pelvis").tolist(),
     }
-    (made,) = draw(server, model, segments=[like, text(frames=30)])
-    assert made["num_frames"] == 80
-    apart = made["places"][:40] - source["places"]
+    (motion,) = draw(server, model, segments=[like, text(frames=30)])
+    assert motion["num_frames"] == 80
+    apart = motion["places"][:40] - source["places"]
     assert np.abs(apart).max() > 0.02
-    speed = np.linalg.norm(np.diff(made["places"], axis=0), axis=-1) * 20
+    speed = np.linalg.norm(np.diff(motion["places"], axis=0), axis=-1) * 20
     assert speed[45:55].max() < 12  # nobody jumps from one segment to the next
 
 
@@ -212,12 +212,12 @@ def test_rest_rotations_are_taken_out_and_put_back() -> None:
 
 def test_motion_comes_on_the_clients_own_rig_in_its_size(server: Server, model: dict[str, Any]) -> None:
     path = {"type": "root_path", "frames": [0, 39], "positions_xz": [[0, 0], [0, 2.4]]}
-    (made,) = draw(server, model, segments=[text()], constraints=[path], skeleton=other_rig())
-    hips = place(made, "mixamorig:Hips")
+    (motion,) = draw(server, model, segments=[text()], constraints=[path], skeleton=other_rig())
+    hips = place(motion, "mixamorig:Hips")
     assert np.abs(hips[-1, [0, 2]] - [0, 2.4]).max() < 0.08
-    toes = np.minimum(place(made, "mixamorig:LeftToeBase")[:, 1], place(made, "mixamorig:RightToeBase")[:, 1])
+    toes = np.minimum(place(motion, "mixamorig:LeftToeBase")[:, 1], place(motion, "mixamorig:RightToeBase")[:, 1])
     assert -0.05 < toes.min() < 0.1
-    heads = place(made, "mixamorig:Head")[:, 1]
+    heads = place(motion, "mixamorig:Head")[:, 1]
     assert (heads > 1.4).all()  # 1.2 times a person, upright, whatever its bones' axes
 
 
@@ -239,12 +239,12 @@ def broken() -> list[tuple[dict[str, Any], str]]:
     ]
 
 
-@pytest.mark.parametrize(("asked", "code"), broken())
+@pytest.mark.parametrize(("fields", "code"), broken())
 def test_what_cannot_be_asked_comes_in_the_envelope(
-    server: Server, model: dict[str, Any], asked: dict[str, Any], code: str
+    server: Server, model: dict[str, Any], fields: dict[str, Any], code: str
 ) -> None:
     with pytest.raises(client.MmcpError) as refused:
-        client.generate(url(server), WHOLE | {"skeleton": model["canonical_skeleton"]} | copy.deepcopy(asked))
+        client.generate(url(server), WHOLE | {"skeleton": model["canonical_skeleton"]} | copy.deepcopy(fields))
     assert refused.value.code == code
     assert str(refused.value)
 

@@ -16,9 +16,9 @@ def test_the_files_of_a_built_page_are_found_by_their_paths(tmp_path: Path) -> N
     (tmp_path / "assets").mkdir()
     for name in ("index.html", "assets/index-1a2b.js", "favicon.svg"):
         (tmp_path / name).write_text("x")
-    found = page.files(tmp_path)
-    assert set(found) == {"/", "/index.html", "/assets/index-1a2b.js", "/favicon.svg"}
-    assert found["/"] == tmp_path / "index.html"
+    paths = page.files(tmp_path)
+    assert set(paths) == {"/", "/index.html", "/assets/index-1a2b.js", "/favicon.svg"}
+    assert paths["/"] == tmp_path / "index.html"
 
 
 def test_without_a_page_one_route_says_so(tmp_path: Path) -> None:
@@ -33,26 +33,26 @@ def scope(path: str, **headers: str) -> dict[str, object]:
 
 
 def test_the_pages_files_need_no_token_and_all_else_does() -> None:
-    found = door("0.0.0.0", "secret-token", hosts=(), origins=(), page=["/", "/assets/x.js"])
-    assert found.problem(scope("/assets/x.js", host="10.0.0.7:8020")) is None
-    assert found.problem(scope("/", host="10.0.0.7:8020")) is None
+    guarded = door("0.0.0.0", "secret-token", hosts=(), origins=(), page=["/", "/assets/x.js"])
+    assert guarded.problem(scope("/assets/x.js", host="10.0.0.7:8020")) is None
+    assert guarded.problem(scope("/", host="10.0.0.7:8020")) is None
     for path in ("/assets/y.js", "/project", "/motions/0123456789abcdef.bvh", "/docs"):
-        problem = found.problem(scope(path, host="10.0.0.7:8020"))
+        problem = guarded.problem(scope(path, host="10.0.0.7:8020"))
         assert problem is not None
         assert problem[0] == 401
-    assert found.problem(scope("/project", host="10.0.0.7", authorization="Bearer secret-token")) is None
+    assert guarded.problem(scope("/project", host="10.0.0.7", authorization="Bearer secret-token")) is None
 
 
 def test_a_page_may_not_be_written_to_without_a_token() -> None:
-    found = door("0.0.0.0", "secret-token", hosts=(), origins=(), page=["/"])
-    assert found.problem({**scope("/", host="10.0.0.7"), "method": "POST"}) is not None
+    guarded = door("0.0.0.0", "secret-token", hosts=(), origins=(), page=["/"])
+    assert guarded.problem({**scope("/", host="10.0.0.7"), "method": "POST"}) is not None
 
 
 def test_a_named_host_and_a_named_origin_are_let_in() -> None:
-    found = door("127.0.0.1", None, hosts=["Studio.local"], origins=["http://localhost:5173"], page=())
-    assert found.problem(scope("/jobs", host="studio.local:8020")) is None
-    assert found.problem(scope("/jobs", host="localhost:8020", origin="http://localhost:5173")) is None
-    assert found.problem(scope("/jobs", host="localhost:8020", origin="http://localhost:5174")) is not None
+    guarded = door("127.0.0.1", None, hosts=["Studio.local"], origins=["http://localhost:5173"], page=())
+    assert guarded.problem(scope("/jobs", host="studio.local:8020")) is None
+    assert guarded.problem(scope("/jobs", host="localhost:8020", origin="http://localhost:5173")) is None
+    assert guarded.problem(scope("/jobs", host="localhost:8020", origin="http://localhost:5174")) is not None
 
 
 @pytest.mark.parametrize(

@@ -43,11 +43,11 @@ def _promises(headers: dict[str, str]) -> bool:
 def test_every_answer_says_what_a_page_may_load_and_who_may_frame_it(
     server: Server, method: str, path: str, body: bytes | None, more: dict[str, str], status: int
 ) -> None:
-    found, headers, _ = server.ask(method, path, body, headers=more)
+    code, headers, _ = server.ask(method, path, body, headers=more)
     if path == "/generate":
-        assert 400 <= found < 504
+        assert 400 <= code < 504
     else:
-        assert found == status
+        assert code == status
     assert _promises(headers)
 
 
@@ -72,28 +72,28 @@ def test_what_is_no_http_at_all_is_answered_with_the_same_headers(server: Server
 @pytest.fixture
 def listener() -> Iterator[tuple[str, list[str]]]:
     """The address of somebody else's server, and what it was asked for."""
-    asked: list[str] = []
+    paths: list[str] = []
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
-            asked.append(self.path)
+            paths.append(self.path)
             self.send_error(404)
 
         def log_message(self, *_: object) -> None:
             """Nothing is printed."""
 
-    found = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=found.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{found.server_port}", asked
-    found.shutdown()
-    found.server_close()
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}", paths
+    server.shutdown()
+    server.server_close()
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".vrm", ".gltf"])
 def test_what_a_character_names_elsewhere_is_asked_for_by_no_reader(
     server: Server, walk: str, listener: tuple[str, list[str]], tmp_path: Path, suffix: str
 ) -> None:
-    address, asked = listener
+    address, paths = listener
     hero = Hero(seed=5)
     hero.json["images"] = [{"uri": f"{address}/picture.png"}]
     hero.json["textures"] = [{"source": 0}]
@@ -109,4 +109,4 @@ def test_what_a_character_names_elsewhere_is_asked_for_by_no_reader(
         assert status == 201
         for kind in ("glb", "png"):
             assert server.ask("GET", f"/motions/{walk}.{kind}?skeleton={answer['id']}")[0] == 200
-    assert asked == []
+    assert paths == []

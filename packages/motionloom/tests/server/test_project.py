@@ -24,9 +24,9 @@ TIMELINE = {
 
 
 def test_what_was_saved_is_given_back(server: Server) -> None:
-    said = {"timeline": TIMELINE, "name": "ein Gang – été", "takes": [1, 2.5, None, True]}
-    assert server.json("PUT", "/project", said)[0] == 200
-    assert server.json("GET", "/project") == (200, said)
+    project = {"timeline": TIMELINE, "name": "ein Gang – été", "takes": [1, 2.5, None, True]}
+    assert server.json("PUT", "/project", project)[0] == 200
+    assert server.json("GET", "/project") == (200, project)
 
 
 def segments(name: str, **more: Any) -> dict[str, Any]:
@@ -80,14 +80,14 @@ def test_a_client_whose_answer_was_lost_is_not_taken_for_somebody_else(server: S
 def test_what_is_there_is_replaced_where_the_client_names_it(server: Server, folder: Path) -> None:
     """And what was saved after that is not; another project then stays under another name."""
     put(server, segments("one", id="film", revision=0))
-    seen = server.json("GET", "/project/stamp")[1]
+    stamp = server.json("GET", "/project/stamp")[1]
     put(server, segments("two", id="film", revision=1))
-    assert put(server, segments("mine", id="film", revision=0), over=seen)[0] == 409
-    seen = server.json("GET", "/project/stamp")[1]
-    assert put(server, segments("mine", id="film", revision=0), over=seen)[1]["revision"] == 3
+    assert put(server, segments("mine", id="film", revision=0), over=stamp)[0] == 409
+    stamp = server.json("GET", "/project/stamp")[1]
+    assert put(server, segments("mine", id="film", revision=0), over=stamp)[1]["revision"] == 3
     assert not list(folder.glob("project.2*"))
-    seen = server.json("GET", "/project/stamp")[1]
-    status, answer = put(server, segments("another film", id="other", revision=5), over=seen)
+    stamp = server.json("GET", "/project/stamp")[1]
+    status, answer = put(server, segments("another film", id="other", revision=5), over=stamp)
     assert (status, answer["id"], answer["revision"]) == (200, "other", 6)
     status, rows = server.json("GET", "/projects")
     assert [(one["id"], one["name"], one.get("open", False)) for one in rows] == [
@@ -98,10 +98,10 @@ def test_what_is_there_is_replaced_where_the_client_names_it(server: Server, fol
 
 def test_projects_of_a_folder_are_listed_and_opened_and_none_is_lost(server: Server, folder: Path) -> None:
     put(server, segments("one", id="film", revision=0))
-    seen = server.json("GET", "/project/stamp")[1]
+    stamp = server.json("GET", "/project/stamp")[1]
     take = {"motion": "0123456789abcdef", "seconds": 2}
     block = {"text": "a person walks", "seconds": 2.5}
-    put(server, segments("two", id="other", revision=0, segments=[block, block], takes=[take], kept=0), over=seen)
+    put(server, segments("two", id="other", revision=0, segments=[block, block], takes=[take], kept=0), over=stamp)
     assert server.json("POST", "/project/open?id=film") == (200, {"id": "film", "revision": 1})
     assert server.json("GET", "/project")[1]["name"] == "one"
     rows = server.json("GET", "/projects")[1]
@@ -135,10 +135,14 @@ def test_what_lies_damaged_among_the_projects_is_left_out_and_stays(server: Serv
 
 
 def test_a_sentence_becomes_a_segment_for_each_action(server: Server) -> None:
-    status, found = server.json("POST", "/sentence.json", b"a person walks, turns around and waves")
+    status, timeline = server.json("POST", "/sentence.json", b"a person walks, turns around and waves")
     assert status == 200
-    assert [one["text"] for one in found["segments"]] == ["a person walks", "a person turns around", "a person waves"]
-    assert all(1 < one["seconds"] < 10 for one in found["segments"])
+    assert [one["text"] for one in timeline["segments"]] == [
+        "a person walks",
+        "a person turns around",
+        "a person waves",
+    ]
+    assert all(1 < one["seconds"] < 10 for one in timeline["segments"])
     assert server.json("POST", "/sentence.json", b" ")[0] == 400
     assert server.json("POST", "/sentence.json", b"\xff")[0] == 400
 
@@ -217,19 +221,19 @@ def test_a_full_disk_is_told_and_nothing_stays_half_written(server: Server, fold
         kind = path[-4:]
         body = server.ask("GET", f"/motions/{walk}{kind}")[2]
     before = {place: place.read_bytes() for place in folder.rglob("*") if place.is_file()}
-    said = []
+    sentences = []
     for room in (100, 3_000, 10_000, 20_000, 40_000, 1 << 40):
         resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
         try:
             status, answer = server.json("PUT" if path == "/project" else "POST", path, body)
         finally:
             resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, NO_LIMIT)
-        said.append(status)
+        sentences.append(status)
         if status < 300:
             break
         assert (status, "the disk of the project folder is full" in answer["error"]) == (507, True)
         assert {place: place.read_bytes() for place in folder.rglob("*") if place.is_file()} == before
-    assert len(said) > 2
+    assert len(sentences) > 2
 
 
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="limits another process's files as Linux does")
@@ -293,9 +297,9 @@ def test_a_mistake_says_which_keys_are_its_cause(server: Server, segment: dict, 
 
 
 def test_the_command_line_makes_the_same_motion_of_the_yaml(server: Server, tmp_path: Path) -> None:
-    (made,) = server.draw(task="compose", timeline=TIMELINE, steps=4)["results"]
+    (result,) = server.draw(task="compose", timeline=TIMELINE, steps=4)["results"]
     (tmp_path / "t.yaml").write_bytes(server.ask("POST", "/timeline.yaml", TIMELINE)[2])
-    (tmp_path / "served.npz").write_bytes(server.ask("GET", f"/motions/{made['id']}.npz")[2])
+    (tmp_path / "served.npz").write_bytes(server.ask("GET", f"/motions/{result['id']}.npz")[2])
     command = [sys.executable, "-m", "motionloom", "compose", "t.yaml", "--steps", "4", "--out", "own.npz"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     served, own = load(tmp_path / "served.npz"), load(tmp_path / "own.npz")
@@ -386,17 +390,17 @@ def test_the_front_door_says_what_is_missing_or_shows_the_page(server: Server) -
 def test_a_server_that_is_killed_comes_back_with_project_and_motions(tmp_path: Path) -> None:
     pytest.importorskip("starlette")
     with running(tmp_path) as first:
-        (made,) = first.draw(task="generate", prompt="a person walks", seconds=1.0, steps=2)["results"]
-        first.json("PUT", "/project", {"takes": [made["id"]]})
+        (result,) = first.draw(task="generate", prompt="a person walks", seconds=1.0, steps=2)["results"]
+        first.json("PUT", "/project", {"takes": [result["id"]]})
         job = first.submit(task="generate", prompt="a person walks", seconds=10.0, count=8, steps=200)
         next(event for event in first.events(job) if event[1] == "level")
         first.kill()
     with running(tmp_path) as second:
-        assert second.json("GET", "/project") == (200, {"takes": [made["id"]]})
-        assert second.json("GET", f"/motions/{made['id']}")[0] == 200
+        assert second.json("GET", "/project") == (200, {"takes": [result["id"]]})
+        assert second.json("GET", f"/motions/{result['id']}")[0] == 200
         assert second.json("GET", f"/jobs/{job}")[0] == 404
-        assert second.draw(task="predict", motion=made["id"], seconds=0.5, count=1)["state"] == "done"
-        left = [path.name for path in (tmp_path / "motions").iterdir() if not path.name.startswith(made["id"])]
+        assert second.draw(task="predict", motion=result["id"], seconds=0.5, count=1)["state"] == "done"
+        left = [path.name for path in (tmp_path / "motions").iterdir() if not path.name.startswith(result["id"])]
         assert not [name for name in left if name.startswith(".")]
 
 

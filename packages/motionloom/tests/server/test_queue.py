@@ -90,10 +90,10 @@ def test_a_removed_job_is_not_taken() -> None:
 
 def log(one: Job) -> list[Event]:
     """All that a stream sends of a job's log as it is now."""
-    found: list[Event] = []
-    while (event := one.event_after(found[-1].number if found else 0)) is not None:
-        found.append(event)
-    return found
+    events: list[Event] = []
+    while (event := one.event_after(events[-1].number if events else 0)) is not None:
+        events.append(event)
+    return events
 
 
 def data(event: Event) -> dict[str, Any]:
@@ -104,9 +104,9 @@ def test_the_log_of_a_job_stays_small_and_keeps_the_newest() -> None:
     one = Job(JobRequest("generate", None, Sampling()), "a", 400_000)
     for level in range(1, 51):
         one.level(level, 50, 0, np.zeros((1, 100, 22, 3)))
-    kept = [data(event)["level"] for event in log(one)]
-    assert kept == list(range(51 - len(kept), 51))
-    assert len(kept) == 400_000 // len(log(one)[-1].text)
+    levels = [data(event)["level"] for event in log(one)]
+    assert levels == list(range(51 - len(levels), 51))
+    assert len(levels) == 400_000 // len(log(one)[-1].text)
     assert one.log_bytes <= one.most_bytes
 
 
@@ -121,14 +121,14 @@ def test_an_event_is_written_out_once_however_many_read_it() -> None:
 def test_a_stream_that_is_slow_goes_on_with_what_is_still_in_the_log() -> None:
     one = Job(JobRequest("generate", None, Sampling()), "a", 100_000)
     one.level(1, 99, 0, np.zeros((1, 40, 22, 3)))
-    seen = one.event_after(0)
-    assert seen is not None
+    first = one.event_after(0)
+    assert first is not None
     for level in range(2, 100):
         one.level(level, 99, 0, np.zeros((1, 40, 22, 3)))
         one.progress(level, 99)
     one.end("done")
     rest = []
-    while (event := one.event_after(rest[-1].number if rest else seen.number)) is not None:
+    while (event := one.event_after(rest[-1].number if rest else first.number)) is not None:
         rest.append(event)
     assert data(rest[0])["level"] > 2
     assert [event.number for event in rest] == sorted({event.number for event in rest})

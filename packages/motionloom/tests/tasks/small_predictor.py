@@ -9,22 +9,22 @@ from motionloom.weights.prior import Card
 from tests.recorded.graphs import PREDICTORS
 from tests.recorded.tiny_predictor import network
 
-OBSERVED, FRAMES, FPS, KEPT = 15, 45, 30.0, 16
+OBSERVED, FRAMES, FPS, FREQUENCIES = 15, 45, 30.0, 16
 
 
 def small_predictor(*, lively: float = 0.03) -> Predictor:
     """``lively``: how far people leave their last pose, about in metres."""
-    spread = np.tile((FRAMES**0.5 / (1 + np.arange(KEPT)[:, None]) ** 2).astype(np.float32), 66)
+    spread = np.tile((FRAMES**0.5 / (1 + np.arange(FREQUENCIES)[:, None]) ** 2).astype(np.float32), 66)
     pose = np.stack([np.zeros(66, np.float32), np.ones(66, np.float32)])
     return Predictor(
         network(PREDICTORS["small"], 4, lively=lively),
         sqrt(1000),
         SMPL_LAYOUT,
-        Dct(FRAMES, KEPT),
+        Dct(FRAMES, FREQUENCIES),
         OBSERVED,
         FPS,
         "masked",
-        np.zeros((KEPT, 66), np.float32),
+        np.zeros((FREQUENCIES, 66), np.float32),
         spread,
         pose,
         Card("small"),

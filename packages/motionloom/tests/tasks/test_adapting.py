@@ -30,7 +30,7 @@ def weights(prior: Prior) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("word", "found"),
+    ("word", "expected"),
     [
         ("a.safetensors", ("a.safetensors", 1.0)),
         ("a.safetensors:0.8", ("a.safetensors", 0.8)),
@@ -40,8 +40,8 @@ def weights(prior: Prior) -> np.ndarray:
         ("a:b", ("a:b", 1.0)),
     ],
 )
-def test_a_factor_stands_behind_the_last_colon(word: str, found: tuple[str, float]) -> None:
-    assert parse_adapter(word) == (Path(found[0]), found[1])
+def test_a_factor_stands_behind_the_last_colon(word: str, expected: tuple[str, float]) -> None:
+    assert parse_adapter(word) == (Path(expected[0]), expected[1])
 
 
 @pytest.mark.parametrize("word", ["", ":0.8", "a:1e9", "a:nan", "a:inf", f"a:{MOST_FACTOR + 0.1}"])
@@ -128,8 +128,8 @@ def test_how_many_rows_go_together_changes_nothing(prior: Prior) -> None:
 def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> None:
     one = adapter(prior)
     place = one.save(tmp_path / "a.safetensors")
-    (found,) = load_segment_adapters(prior, [replace(WALK, adapters=((place, 0.5),))])
-    ((read, factor),) = found.adapters
+    (segment,) = load_segment_adapters(prior, [replace(WALK, adapters=((place, 0.5),))])
+    ((read, factor),) = segment.adapters
     assert isinstance(read, Adapter)
     assert (read.name, factor) == ("a1", 0.5)
     (tmp_path / "b.safetensors").write_bytes(b"x" * 100)

@@ -39,13 +39,13 @@ def test_of_equals_the_one_nearest_to_the_mean_at_pure_noise_is_kept(monkeypatch
     halfway = dict(sample(prior, Rows([TURN] * 5, [40] * 5, tried), SAMPLING, halfway=True))
     away = [float(((halfway[i] - mean)[:, ROT6D] ** 2).mean()) for i in range(5)]
     assert sorted(away)[1] - min(away) > 1e-3  # no tie
-    kept = with_best_seeds(prior, Rows([TURN], [40], [7]), replace(SAMPLING, best_of=5)).seeds
-    assert kept == [tried[away.index(min(away))]]
+    seeds = with_best_seeds(prior, Rows([TURN], [40], [7]), replace(SAMPLING, best_of=5)).seeds
+    assert seeds == [tried[away.index(min(away))]]
 
 
-@pytest.mark.parametrize(("met", "whole", "kept"), [((0, 1, 0, 1), (1, 1, 1, 1), 1), ((1, 1, 1, 1), (0, 0, 1, 0), 2)])
+@pytest.mark.parametrize(("met", "whole", "place"), [((0, 1, 0, 1), (1, 1, 1, 1), 1), ((1, 1, 1, 1), (0, 0, 1, 0), 2)])
 def test_what_words_allow_to_check_comes_first_and_a_whole_body_second(
-    prior: Prior, monkeypatch: pytest.MonkeyPatch, met: tuple[int, ...], whole: tuple[int, ...], kept: int
+    prior: Prior, monkeypatch: pytest.MonkeyPatch, met: tuple[int, ...], whole: tuple[int, ...], place: int
 ) -> None:
     """Whatever is nearest to the mean. Two that do as much: the livelier."""
     shares, bodies = iter(met), iter(whole)
@@ -55,15 +55,15 @@ def test_what_words_allow_to_check_comes_first_and_a_whole_body_second(
     monkeypatch.setattr("motionloom.tasks.best._distance", lambda *_: next(far))
     monkeypatch.setattr("motionloom.tasks.best.asks_for_rest", lambda _: True)
     seeds = [7, *(row_seed(7, number) for number in range(1, 4))]
-    assert best(prior, [WALK], [7]) == [seeds[kept]]
+    assert best(prior, [WALK], [7]) == [seeds[place]]
 
 
 def test_halfway_gives_the_estimates_after_half_of_the_calls(prior: Prior) -> None:
     calls: list[tuple[int, int]] = []
     rows = Rows([WALK], [12], [3])
-    made = dict(sample(prior, rows, SAMPLING, halfway=True, progress=lambda *pair: calls.append(pair)))
+    states = dict(sample(prior, rows, SAMPLING, halfway=True, progress=lambda *pair: calls.append(pair)))
     assert calls == [(1, 3), (2, 3), (3, 3)]  # of five
-    assert not np.allclose(made[0], dict(sample(prior, rows, SAMPLING))[0])
+    assert not np.allclose(states[0], dict(sample(prior, rows, SAMPLING))[0])
 
 
 def test_the_choice_for_a_motion_depends_on_that_motion_alone(prior: Prior) -> None:
@@ -73,20 +73,20 @@ def test_the_choice_for_a_motion_depends_on_that_motion_alone(prior: Prior) -> N
 
 
 def test_what_is_made_is_what_the_best_seed_makes(prior: Prior) -> None:
-    made = sample_features(prior, [WALK, TURN], [12, 12], seeds=[5, 6], steps=5, best_of=4)
+    features = sample_features(prior, [WALK, TURN], [12, 12], seeds=[5, 6], steps=5, best_of=4)
     chosen = best(prior, [WALK, TURN], [5, 6])
     plain = sample_features(prior, [WALK, TURN], [12, 12], seeds=chosen, steps=5)
-    np.testing.assert_allclose(made, plain, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(features, plain, rtol=0, atol=1e-5)
     (motion,) = generate(prior, TURN, seconds=0.6, seed=6, foot_lock=False, steps=5, best_of=4)
     expected = finish(prior, plain[1], foot_lock=False).positions()
     np.testing.assert_allclose(motion.positions(), expected, atol=1e-4)
 
 
 def test_progress_sees_one_job(prior: Prior) -> None:
-    said: list[tuple[int, int]] = []
-    generate(prior, WALK, seconds=0.6, steps=4, count=3, best_of=4, progress=lambda *pair: said.append(pair))
+    reports: list[tuple[int, int]] = []
+    generate(prior, WALK, seconds=0.6, steps=4, count=3, best_of=4, progress=lambda *pair: reports.append(pair))
     of = 2 * 2 + 4  # two batches of six and six candidates to half of the calls, and three motions
-    assert said == [(done, of) for done in range(1, of + 1)]
+    assert reports == [(calls, of) for calls in range(1, of + 1)]
 
 
 @pytest.mark.parametrize("count", [0, -1, 17, 2.5, True])

@@ -54,16 +54,16 @@ def far_from(borders: list[int], frames: int) -> np.ndarray:
 def test_blocks_are_the_whole_where_nothing_is_planted() -> None:
     """High above the floor no foot stands, and a body is a matter of its own frame and a few beside it."""
     whole = places(250, high=2.0)
-    once, made = solve(whole, 20.0), strung(list(solve_stream(cut(whole, [70, 1, 99, 80]), 20.0)))
-    apart = np.abs(once.positions() - made.positions()).max(axis=(1, 2))
+    once, motion = solve(whole, 20.0), strung(list(solve_stream(cut(whole, [70, 1, 99, 80]), 20.0)))
+    apart = np.abs(once.positions() - motion.positions()).max(axis=(1, 2))
     assert apart[far_from([60, 120, 180], 250)].max() < 1e-6
     assert apart.max() < 1e-6
 
 
 def test_blocks_are_nearly_the_whole_where_feet_stand() -> None:
     whole = places(250, planted=True)
-    once, made = solve(whole, 20.0), strung(list(solve_stream([whole], 20.0)))
-    apart = np.linalg.norm(once.positions() - made.positions(), axis=-1).max(axis=1)
+    once, motion = solve(whole, 20.0), strung(list(solve_stream([whole], 20.0)))
+    apart = np.linalg.norm(once.positions() - motion.positions(), axis=-1).max(axis=1)
     assert apart.max() < 0.02
     assert apart[:60].max() < 0.005
 
@@ -73,15 +73,15 @@ def test_clean_and_contacts_are_those_of_the_frames() -> None:
     whole = places(80, planted=True)
     raw = motion_from_positions(whole.positions, 20.0)
     for clean, expected in ((False, raw), (True, clean_feet(raw, contacts=whole.contacts))):
-        made = strung(list(solve_stream(cut(whole, [30, 50]), 20.0, foot_lock=clean)))
-        np.testing.assert_allclose(made.positions(), expected.positions(), atol=1e-9)
+        motion = strung(list(solve_stream(cut(whole, [30, 50]), 20.0, foot_lock=clean)))
+        np.testing.assert_allclose(motion.positions(), expected.positions(), atol=1e-9)
     assert not np.allclose(raw.positions(), clean_feet(raw, contacts=whole.contacts).positions(), atol=1e-4)
 
 
 def test_nothing_jumps_at_a_border() -> None:
     """Neither place nor speed nor the sign of a quaternion: frames at borders are as calm as all are."""
-    made = strung(list(solve_stream([places(400, planted=True)], 20.0)))
-    points = made.positions()
+    motion = strung(list(solve_stream([places(400, planted=True)], 20.0)))
+    points = motion.positions()
     borders = np.arange(60, 400, 60)
     calm = np.setdiff1d(np.arange(2, 399), (borders[:, None] + np.arange(-2, 16)).ravel())
     for order in (1, 2):
@@ -90,7 +90,7 @@ def test_nothing_jumps_at_a_border() -> None:
             change[(borders[:, None] + np.arange(-order, 15)).ravel().clip(0, len(change) - 1)].max()
             < 1.3 * change[calm - order].max()
         )
-    assert (made.rotations[1:] * made.rotations[:-1]).sum(-1).min() > 0.9
+    assert (motion.rotations[1:] * motion.rotations[:-1]).sum(-1).min() > 0.9
 
 
 def test_signs_stay_when_a_block_begins_with_the_other_ones(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,15 +100,15 @@ def test_signs_stay_when_a_block_begins_with_the_other_ones(monkeypatch: pytest.
     def moody(positions: np.ndarray, fps: float) -> Motion:
         nonlocal count
         count += 1
-        made = motion_from_positions(positions, fps)
-        return replace(made, rotations=made.rotations * (-1) ** (count // 2))
+        motion = motion_from_positions(positions, fps)
+        return replace(motion, rotations=motion.rotations * (-1) ** (count // 2))
 
     monkeypatch.setattr(body, "motion_from_positions", moody)
-    made = strung(list(solve_stream([places(400)], 20.0, foot_lock=False)))
+    joined = strung(list(solve_stream([places(400)], 20.0, foot_lock=False)))
     assert count >= 5
-    assert (made.rotations[1:] * made.rotations[:-1]).sum(-1).min() > 0.9
+    assert (joined.rotations[1:] * joined.rotations[:-1]).sum(-1).min() > 0.9
     monkeypatch.undo()
-    np.testing.assert_allclose(made.positions(), solve(places(400), 20.0, foot_lock=False).positions(), atol=1e-6)
+    np.testing.assert_allclose(joined.positions(), solve(places(400), 20.0, foot_lock=False).positions(), atol=1e-6)
 
 
 @pytest.mark.parametrize("frame", [59, 60, 66, 118, 125])
@@ -119,9 +119,9 @@ def test_a_goal_beside_a_border_is_met(frame: int) -> None:
     goal = Goal.nothing(200)
     once = solve(whole, 20.0).positions()[frame, wrist]
     goal.positions[frame, wrist], goal.mask[frame, wrist] = once + np.array([0, 0.1, 0]), True
-    made = strung(list(solve_stream(cut(replace(whole, goal=goal), [50, 50, 25, 75]), 20.0))).positions()
-    assert np.linalg.norm(made[frame, wrist] - goal.positions[frame, wrist]) < 0.005
-    assert np.abs(made[frame, SMPL22.index("right_wrist")] - once).max() > 0.1
+    positions = strung(list(solve_stream(cut(replace(whole, goal=goal), [50, 50, 25, 75]), 20.0))).positions()
+    assert np.linalg.norm(positions[frame, wrist] - goal.positions[frame, wrist]) < 0.005
+    assert np.abs(positions[frame, SMPL22.index("right_wrist")] - once).max() > 0.1
 
 
 @settings(max_examples=40, deadline=None)
@@ -138,9 +138,9 @@ def test_every_frame_comes_once(data: st.DataObject) -> None:
             patch.setattr(body, name, value)
         patch.setattr(body, "solve", lambda places, fps, foot_lock: standing(places.positions[:, 0]))
         whole = Places(np.arange(total)[:, None, None] * np.ones((1, 22, 3)), np.zeros((total, 4)), Goal.nothing(total))
-        made = list(solve_stream(cut(whole, sizes), 20.0))
-    assert np.allclose(strung(made).root[:, 0], np.arange(total))
-    assert all(len(one) == block for one in made[:-1])
+        parts = list(solve_stream(cut(whole, sizes), 20.0))
+    assert np.allclose(strung(parts).root[:, 0], np.arange(total))
+    assert all(len(one) == block for one in parts[:-1])
 
 
 def standing(root: np.ndarray) -> Motion:

@@ -41,11 +41,11 @@ def path(frames: int = 24, *, turn: float = 0.0) -> Goal:
 
 def test_no_targets_make_what_generate_makes(prior: Prior) -> None:
     goal = replace(Goal.nothing(24), start=GroundPose())
-    made = control(prior, "a person walks", goal, seed=4, steps=3, adapters="none")[0]
+    result = control(prior, "a person walks", goal, seed=4, steps=3, adapters="none")[0]
     plain = generate(prior, "a person walks", seconds=1.2, seed=4, steps=3)[0]
-    np.testing.assert_allclose(made.motion.positions(), plain.positions(), atol=1e-6)
-    assert made.error == 0
-    assert made.missed == ()
+    np.testing.assert_allclose(result.motion.positions(), plain.positions(), atol=1e-6)
+    assert result.error == 0
+    assert result.missed == ()
 
 
 def test_a_path_is_met_and_the_quarter_turned_path_gives_the_quarter_turned_motion(prior: Prior) -> None:
@@ -68,11 +68,11 @@ def test_what_is_missed_is_said_worst_first(prior: Prior) -> None:
     goal = replace(Goal.nothing(24), start=GroundPose())
     goal.positions[12, WRIST], goal.mask[12, WRIST] = [0.0, 4.0, 0.0], True
     goal.positions[6, WRIST], goal.mask[6, WRIST] = [0.0, 6.0, 0.0], True
-    made = control(prior, "a person walks", goal, steps=2)[0]
-    assert len(made.missed) == 2
-    assert made.missed[0].startswith("right_wrist at 0.30 s is ")
-    assert made.missed[1].startswith("right_wrist at 0.60 s")
-    assert made.worst > made.error > 1
+    result = control(prior, "a person walks", goal, steps=2)[0]
+    assert len(result.missed) == 2
+    assert result.missed[0].startswith("right_wrist at 0.30 s is ")
+    assert result.missed[1].startswith("right_wrist at 0.60 s")
+    assert result.worst > result.error > 1
 
 
 def test_error_is_the_mean_distance_over_what_is_asked(prior: Prior) -> None:
@@ -81,9 +81,9 @@ def test_error_is_the_mean_distance_over_what_is_asked(prior: Prior) -> None:
     goal = replace(Goal.nothing(len(motion)), positions=motion.positions() + np.array([0.03, 7.0, 0.04]))
     goal.mask[5, WRIST, [0, 2]] = True
     goal.positions[9, 0], goal.mask[9, 0] = motion.root[9], True
-    found = evaluate(motion, motion, goal)
-    assert found.error == pytest.approx(0.025)
-    assert found.worst == pytest.approx(0.05)
+    result = evaluate(motion, motion, goal)
+    assert result.error == pytest.approx(0.025)
+    assert result.worst == pytest.approx(0.05)
 
 
 def test_the_numbers_that_a_goal_is_about() -> None:
@@ -97,8 +97,8 @@ def test_the_numbers_that_a_goal_is_about() -> None:
 def test_adapters_see_the_last_steered_estimate_and_none_that_change_nothing_change_little(prior: Prior) -> None:
     """An adapter of zeros is the prior; what it is shown is the steered guess in the numbers asked, noise-free."""
     blank = adapter(prior)
-    made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[(blank, 0.25), (blank, 0.75)])[0]
-    assert made.error < 0.005
+    result = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[(blank, 0.25), (blank, 0.75)])[0]
+    assert result.error < 0.005
     free = replace(Goal.nothing(24), start=GroundPose())
     same = control(prior, "a person walks", free, seed=1, steps=3, adapters=[blank])[0]
     plain = control(prior, "a person walks", free, seed=1, steps=3, adapters="none")[0]
@@ -111,7 +111,7 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
     files = {"trajectory": adapter(prior).save(tmp_path / "trajectory.safetensors")}
     monkeypatch.setattr("motionloom.tasks.control.shipped", lambda: files)
     monkeypatch.setattr("motionloom.weights.container.Container.shipped", lambda self: files)
-    assert [found.name for found in fitting_adapters(prior, path())] == ["blank"]
+    assert [one.name for one in fitting_adapters(prior, path())] == ["blank"]
     with pytest.raises(MotionloomError, match="belongs to the weights"):
         fitting_adapters(tiny.prior(seed=5), path())
     files["trajectory"].write_bytes(b"not an adapter")
@@ -141,10 +141,10 @@ def test_the_shipped_prior_walks_a_bent_path_to_a_centimetre() -> None:
     goal = Goal.nothing(frames)
     goal.positions[:, 0, 2], goal.positions[:, 0, 0] = along, 0.4 * np.sin(along * 1.5)
     goal.mask[:, 0, [0, 2]] = True
-    made = control(Prior.load(), "a person walks", goal, steps=8)[0]
-    assert made.error < 0.01
-    assert made.missed == ()
-    places = made.motion.positions()
+    result = control(Prior.load(), "a person walks", goal, steps=8)[0]
+    assert result.error < 0.01
+    assert result.missed == ()
+    places = result.motion.positions()
     assert places[..., 1].min() > -0.05
     assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() < 0.4
 
@@ -156,16 +156,16 @@ def test_a_hand_that_is_asked_too_high_lifts_nobody_but_who_jumps(words: str, le
     """2.9 m is beyond both: the feet stay on the floor, if on tiptoe, or leave it as people jump, and it is said."""
     goal, wrist = Goal.nothing(60), SMPL22.index("right_wrist")
     goal.positions[30, wrist], goal.mask[30, wrist] = [-0.2, 2.9, 0.3], True
-    (made,) = control(Prior.load(), words, goal, seed=1, steps=12)
-    places = made.motion.positions()
+    (result,) = control(Prior.load(), words, goal, seed=1, steps=12)
+    places = result.motion.positions()
     ankles = places[:, [7, 8], 1].min(axis=1)
     assert least < ankles[30] - np.percentile(ankles, 10) < most
-    assert made.worst > 0.3
-    assert made.missed[0].startswith("right_wrist at 1.50 s")
+    assert result.worst > 0.3
+    assert result.missed[0].startswith("right_wrist at 1.50 s")
     assert places[30, wrist, 1] > 1.8
 
 
 def adapter(prior: Prior) -> Adapter:
     """One of zeros."""
-    found = tiny.adapter(prior, control="any")
-    return replace(found, name="blank", tensors={name: 0 * value for name, value in found.tensors.items()})
+    result = tiny.adapter(prior, control="any")
+    return replace(result, name="blank", tensors={name: 0 * value for name, value in result.tensors.items()})

@@ -43,23 +43,23 @@ def gaze(motion: Motion) -> np.ndarray:
 
 def test_an_arm_follows_another_clip_and_the_rest_stays() -> None:
     clip = person(4.0)
-    made = changed(clip, Overlay(((1.0, 3.0),), waving(5.0), ALL_BUT_THE_ARM))
+    edited = changed(clip, Overlay(((1.0, 3.0),), waving(5.0), ALL_BUT_THE_ARM))
     others = [joint for joint in range(22) if joint not in SMPL22.groups["right_arm"]]
-    assert np.array_equal(made.rotations[:, others], clip.rotations[:, others])
-    assert np.array_equal(made.root, clip.root)
-    assert np.array_equal(made.rotations[:20], clip.rotations[:20])
-    assert np.array_equal(made.rotations[60:], clip.rotations[60:])
-    assert np.abs(made.rotations[40, 17] - waving(1.0).rotations[0, 17]).max() < 1e-6
-    steps = np.linalg.norm(np.diff(made.positions()[:, RIGHT_WRIST], axis=0), axis=-1)
+    assert np.array_equal(edited.rotations[:, others], clip.rotations[:, others])
+    assert np.array_equal(edited.root, clip.root)
+    assert np.array_equal(edited.rotations[:20], clip.rotations[:20])
+    assert np.array_equal(edited.rotations[60:], clip.rotations[60:])
+    assert np.abs(edited.rotations[40, 17] - waving(1.0).rotations[0, 17]).max() < 1e-6
+    steps = np.linalg.norm(np.diff(edited.positions()[:, RIGHT_WRIST], axis=0), axis=-1)
     assert steps.max() < 0.3, "the arm goes up in a few frames"
 
 
 def test_another_body_follows_as_well_and_no_longer_than_the_clip_lasts() -> None:
     clip = from_smpl22(person(4.0), rig())
-    made = changed(clip, Overlay(((1.0, 4.0),), waving(1.0), ALL_BUT_THE_ARM))
-    up = joints22(made)[:, RIGHT_WRIST, 1] - joints22(clip)[:, RIGHT_WRIST, 1]
+    edited = changed(clip, Overlay(((1.0, 4.0),), waving(1.0), ALL_BUT_THE_ARM))
+    up = joints22(edited)[:, RIGHT_WRIST, 1] - joints22(clip)[:, RIGHT_WRIST, 1]
     assert up[25:35].min() > 0.3
-    assert np.array_equal(made.rotations[40:], clip.rotations[40:])
+    assert np.array_equal(edited.rotations[40:], clip.rotations[40:])
 
 
 @pytest.mark.parametrize("body", [None, rig()], ids=["smpl", "another"])
@@ -68,14 +68,14 @@ def test_a_head_looks_at_a_place(body: Skeleton | None) -> None:
     ahead = rot.rotate(person(3.0).world_rotations()[:, SPINE], FORWARD)
     eyes = joints22(clip)[:, HEAD]
     place = eyes + 3 * rot.rotate(rot.rotvec_to_quat(np.array([0.0, 0.6, 0.0])), ahead)
-    made = looking(clip, place, np.ones(len(clip)))
-    moved = np.linalg.norm(joints22(made)[:, HEAD] - eyes, axis=-1)
+    turned = looking(clip, place, np.ones(len(clip)))
+    moved = np.linalg.norm(joints22(turned)[:, HEAD] - eyes, axis=-1)
     assert moved.max() < 0.08, "a neck is short"
     legs = [0, 1, 2, 4, 5, 7, 8, 16, 17, 20, 21]
-    assert np.allclose(joints22(made)[:, legs], joints22(clip)[:, legs])
+    assert np.allclose(joints22(turned)[:, legs], joints22(clip)[:, legs])
     if body is None:
-        wanted = place - made.positions()[:, HEAD]
-        off = np.arccos(np.clip((gaze(made) * wanted).sum(-1) / np.linalg.norm(wanted, axis=-1), -1, 1))
+        line = place - turned.positions()[:, HEAD]
+        off = np.arccos(np.clip((gaze(turned) * line).sum(-1) / np.linalg.norm(line, axis=-1), -1, 1))
         assert np.degrees(off).max() < 4
 
 
@@ -85,8 +85,8 @@ def test_a_head_turns_no_further_than_a_neck_can_and_not_to_what_is_behind() -> 
     for degrees in (90, 180):
         turn = rot.rotvec_to_quat(np.array([0.0, np.radians(degrees), 0.0]))
         place = clip.positions()[0, HEAD] + 50 * rot.rotate(turn, ahead)
-        made = looking(clip, place, np.ones(len(clip)))
-        angle = np.arccos(gaze(made)[0] @ ahead)
+        turned = looking(clip, place, np.ones(len(clip)))
+        angle = np.arccos(gaze(turned)[0] @ ahead)
         assert angle == pytest.approx(TURN if degrees == 90 else 0.0, abs=1e-6)
     high = looking(clip, clip.positions()[0, HEAD] + [0, 50, 0] + ahead, np.ones(len(clip)))
     assert np.arccos(gaze(high)[0] @ ahead) == pytest.approx(NOD, abs=1e-6)
@@ -97,11 +97,11 @@ ALL_BUT_THE_HEAD = ("lower_body", "torso", "left_arm", "right_arm")
 
 def moved(words: str, clip: Motion, *spans: tuple[float, float]) -> np.ndarray:
     """(frames, 2) degrees to the left and up of where the head looked, of a clip that faces +Z or nearly."""
-    made = changed(clip, *changes_from_options(words, keep=ALL_BUT_THE_HEAD, between=spans))
+    edited = changed(clip, *changes_from_options(words, keep=ALL_BUT_THE_HEAD, between=spans))
     others = [joint for joint in range(22) if joint not in SMPL22.groups["head_neck"]]
-    assert np.array_equal(made.rotations[:, others], clip.rotations[:, others])
-    assert np.allclose(looks(made), gaze(made), atol=0.06), "the uniform person's face is to the front of its head"
-    ahead = rot.rotate(rot.inverse(clip.world_rotations()[:, SPINE]), looks(made))
+    assert np.array_equal(edited.rotations[:, others], clip.rotations[:, others])
+    assert np.allclose(looks(edited), gaze(edited), atol=0.06), "the uniform person's face is to the front of its head"
+    ahead = rot.rotate(rot.inverse(clip.world_rotations()[:, SPINE]), looks(edited))
     before = rot.rotate(rot.inverse(clip.world_rotations()[:, SPINE]), looks(clip))
     angles = [np.stack([np.arctan2(one[:, 0], one[:, 2]), np.arcsin(one[:, 1])], axis=-1) for one in (ahead, before)]
     return np.degrees(angles[0] - angles[1])
@@ -110,10 +110,10 @@ def moved(words: str, clip: Motion, *spans: tuple[float, float]) -> np.ndarray:
 def test_a_head_does_what_words_say_of_it() -> None:
     clip = waving(4.0)
     for words, left, up in (("looks to the left", 55, 0), ("he looks up and to his right", -55, 30)):
-        found = moved(words, clip, (1.0, 3.0))
-        assert found[60] == pytest.approx([left, up], abs=3), words
-        assert np.abs(found[:30]).max() == np.abs(found[90:]).max() == 0
-        assert np.abs(np.diff(found, axis=0)).max() < 10, "softly"
+        angles = moved(words, clip, (1.0, 3.0))
+        assert angles[60] == pytest.approx([left, up], abs=3), words
+        assert np.abs(angles[:30]).max() == np.abs(angles[90:]).max() == 0
+        assert np.abs(np.diff(angles, axis=0)).max() < 10, "softly"
     nods = moved("nods twice", clip)
     assert nods[:, 1].min() == pytest.approx(-20, abs=2)
     assert np.abs(nods[:, 0]).max() < 1
@@ -123,10 +123,10 @@ def test_a_head_does_what_words_say_of_it() -> None:
     slightly = moved("nods slightly and slowly", clip)[:, 1]
     assert slightly.min() == pytest.approx(-10, abs=1)
     for words, side in (("shakes the head three times", 20), ("looks around", 50)):
-        found = moved(words, clip)
-        assert found[:, 0].max() > side
-        assert found[:, 0].min() < -side
-        assert np.abs(found[:, 1]).max() < 3
+        angles = moved(words, clip)
+        assert angles[:, 0].max() > side
+        assert angles[:, 0].min() < -side
+        assert np.abs(angles[:, 1]).max() < 3
 
 
 def test_words_that_say_nothing_of_a_head_are_refused() -> None:
@@ -137,10 +137,10 @@ def test_words_that_say_nothing_of_a_head_are_refused() -> None:
 
 def test_a_look_begins_and_ends_softly() -> None:
     clip = waving(4.0)
-    made = changed(clip, Look(((1.0, 3.0),), np.array([12.0, 1.6, 9.0])))
-    assert np.array_equal(made.rotations[:30], clip.rotations[:30])
-    assert np.array_equal(made.rotations[90:], clip.rotations[90:])
-    turned = np.linalg.norm(np.diff(gaze(made), axis=0), axis=-1)
+    edited = changed(clip, Look(((1.0, 3.0),), np.array([12.0, 1.6, 9.0])))
+    assert np.array_equal(edited.rotations[:30], clip.rotations[:30])
+    assert np.array_equal(edited.rotations[90:], clip.rotations[90:])
+    turned = np.linalg.norm(np.diff(gaze(edited), axis=0), axis=-1)
     assert 0.01 < turned.max() < 0.2
     whole = changed(clip, Look((), np.array([12.0, 1.6, 9.0])))
     assert np.abs(np.diff(gaze(whole), axis=0)).max() < 1e-9, "there is no other side to come from"
@@ -169,9 +169,9 @@ def test_somebody_looks_at_the_other_person() -> None:
     (result,) = run(plan, Models(tiny.prior()))
     first, second = result.people
     assert second is two
-    wanted = two.positions()[:, HEAD] - first.positions()[:, HEAD]
+    line = two.positions()[:, HEAD] - first.positions()[:, HEAD]
     before, after = (
-        np.degrees(np.arccos((gaze(motion) * wanted).sum(-1) / np.linalg.norm(wanted, axis=-1)))[20]
+        np.degrees(np.arccos((gaze(motion) * line).sum(-1) / np.linalg.norm(line, axis=-1)))[20]
         for motion in (one, first)
     )
     assert after < before - 30
@@ -193,24 +193,24 @@ def quickness(motion: Motion) -> np.ndarray:
 
 def test_a_tremor_goes_and_what_is_slow_stays() -> None:
     calm, shaken = trembling(4.0)
-    made = changed(shaken, Smooth((), 0.4))
-    assert quickness(made).mean() < 0.25 * quickness(shaken).mean()
-    apart = np.linalg.norm(made.positions() - calm.positions(), axis=-1)
+    smoothed = changed(shaken, Smooth((), 0.4))
+    assert quickness(smoothed).mean() < 0.25 * quickness(shaken).mean()
+    apart = np.linalg.norm(smoothed.positions() - calm.positions(), axis=-1)
     assert apart.mean() < 0.6 * np.linalg.norm(shaken.positions() - calm.positions(), axis=-1).mean()
     assert np.abs(changed(calm, Smooth((), 0.1)).positions() - calm.positions()).max() < 0.05
 
 
 def test_only_a_stretch_and_only_some_parts_are_smoothed() -> None:
     _, shaken = trembling(4.0)
-    made = changed(shaken, Smooth(((1.0, 3.0),), 0.4, ALL_BUT_THE_ARM))
+    smoothed = changed(shaken, Smooth(((1.0, 3.0),), 0.4, ALL_BUT_THE_ARM))
     arm = SMPL22.groups["right_arm"]
     others = [joint for joint in range(22) if joint not in arm]
-    assert np.array_equal(made.rotations[:, others], shaken.rotations[:, others])
-    assert np.array_equal(made.root, shaken.root)
+    assert np.array_equal(smoothed.rotations[:, others], shaken.rotations[:, others])
+    assert np.array_equal(smoothed.root, shaken.root)
     inside = slice(round(1.0 * shaken.fps), round(3.0 * shaken.fps))
-    assert np.array_equal(np.delete(made.rotations, inside, axis=0), np.delete(shaken.rotations, inside, axis=0))
+    assert np.array_equal(np.delete(smoothed.rotations, inside, axis=0), np.delete(shaken.rotations, inside, axis=0))
     middle = slice(inside.start + 10, inside.stop - 10)
-    turned = [np.abs(np.diff(one.rotations[middle][:, list(arm)], 2, axis=0)).mean() for one in (made, shaken)]
+    turned = [np.abs(np.diff(one.rotations[middle][:, list(arm)], 2, axis=0)).mean() for one in (smoothed, shaken)]
     assert turned[0] < 0.25 * turned[1]
 
 

@@ -54,40 +54,40 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In place of the sampler the features of the real partner, told in another world: he comes back in his place."""
-    given, partner = walkers(1.5, larger=1.0)
+    walker, partner = walkers(1.5, larger=1.0)
     truth = to_smpl22(partner)
-    asked = {}
+    call = {}
 
-    def true(prior, net, said, frames, **how):
-        asked.update(how)
-        uniform = np.stack([person_at_20(motion) for motion in (given, partner)])
+    def true(prior, net, prompts, frames, **how):
+        call.update(how)
+        uniform = np.stack([person_at_20(motion) for motion in (walker, partner)])
         encoded = two.encode(uniform)
         elsewhere = two.compose(np.array([0.0, 1.0, 7.0, -3.0]), encoded.poses)
         return PairMotion.stack([encoded._replace(poses=elsewhere)])
 
     monkeypatch.setattr(tasks, "pair_features", true)
-    [(first, second)] = react(prior, block, given, "two people walk", foot_lock=False)
-    assert first is given
-    assert (len(second), second.fps, second.skeleton) == (len(given), given.fps, SMPL22)
+    [(first, second)] = react(prior, block, walker, "two people walk", foot_lock=False)
+    assert first is walker
+    assert (len(second), second.fps, second.skeleton) == (len(walker), walker.fps, SMPL22)
     apart = np.linalg.norm(second.positions() - truth.positions(), axis=-1)
     assert apart.mean() < 0.03
-    mask = asked["edits"].observed.mask
+    mask = call["edits"].observed.mask
     assert mask[0, 1:].all()
     assert not mask[0, 0].any()
     assert not mask[1].any()
 
 
 def test_the_given_motion_may_stand_on_a_floor_of_its_own(prior: Prior, block: PairBlock) -> None:
-    given, _ = walkers(1.2)
-    raised = replace(given, root=given.root + np.array([0.0, 0.2, 0.0]))
-    [(_, low)] = react(prior, block, given, steps=2, foot_lock=False)
+    first, _ = walkers(1.2)
+    raised = replace(first, root=first.root + np.array([0.0, 0.2, 0.0]))
+    [(_, low)] = react(prior, block, first, steps=2, foot_lock=False)
     [(_, high)] = react(prior, block, raised, steps=2, foot_lock=False)
     np.testing.assert_allclose(high.root - low.root, np.broadcast_to([0.0, 0.2, 0.0], low.root.shape), atol=0.01)
 
 
 def test_motions_that_nobody_can_react_to_are_refused(prior: Prior, block: PairBlock) -> None:
-    given, _ = walkers(1.2)
-    for wrong in (given.frames(0, 5), replace(given, fps=0.1)):
+    first, _ = walkers(1.2)
+    for wrong in (first.frames(0, 5), replace(first, fps=0.1)):
         with pytest.raises(MotionloomError, match="can be reacted to"):
             react(prior, block, wrong)
 
@@ -96,8 +96,8 @@ def test_motions_that_nobody_can_react_to_are_refused(prior: Prior, block: PairB
 
 
 def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, block: PairBlock) -> None:
-    made = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, foot_lock=False)))
-    for motion in made:
+    duet = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, foot_lock=False)))
+    for motion in duet:
         assert len(motion) == 20 + 16 + 18
         steps = np.linalg.norm(np.diff(motion.root, axis=0), axis=-1)
         assert max(steps[19], steps[35]) < 1.5 * np.median(steps) + 0.05
@@ -108,9 +108,9 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
     longer = [replace(segment, seconds=segment.seconds + 2.5) for segment in SEGMENTS]  # long enough for being led
     both = [tasks._segments_of(longer, i, None, 0) for i in (0, 1)]
     one, several = (list(duet_features(prior, net, both, steps=3, batch_size=n)) for n in (1, 8))
-    for (a, stands), (b, others) in zip(one, several, strict=True):
+    for (a, poses), (b, others) in zip(one, several, strict=True):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-4)
-        np.testing.assert_allclose(stands, others, atol=1e-3)
+        np.testing.assert_allclose(poses, others, atol=1e-3)
     assert [piece.shape for piece, _ in one] == [(2, n, 263) for n in (70, 66, 68)]
     again = one[1][0][:, 1:3] - one[0][0][:, -3:-1]  # the second row begins with what the first one ends with
     assert np.abs(again).max() > 1e-3
@@ -131,11 +131,11 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
 ) -> None:
     """A network that always guesses the same: D of a later row, as shown without its noise, is what bodies made of
     the finished motion stand like at the first frame of that row; each is led with noise and words of its own."""
-    shown: dict[int, list[tuple[np.ndarray, int]]] = {}
+    inputs: dict[int, list[tuple[np.ndarray, int]]] = {}
     begins: dict[int, np.ndarray] = {}
     leads: list[dict] = []
-    stands = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    places = block.config.places.encode(stands)
+    poses = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    places = block.config.places.encode(poses)
     features = np.zeros((263,), np.float32)
     features[:4] = np.array([0.03, 0.01, 0.02, 0.9])  # everybody walks a circle, the second another one
     other = features * np.array([-0.5] + [1.0] * 262)
@@ -145,7 +145,7 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
         half = len(x) // 2  # with text, then without
         for row in range(half // 2):
             length = int(bound.lengths[2 * row])
-            shown.setdefault(length, []).append((x[2 * row : 2 * row + 2, 0, :4].copy(), int(level[2 * row])))
+            inputs.setdefault(length, []).append((x[2 * row : 2 * row + 2, 0, :4].copy(), int(level[2 * row])))
         motion = np.repeat(np.tile(clean, (len(x) // 2, 1))[:, None], x.shape[1] - 1, axis=1)
         return join(np.tile(places, (len(x) // 2, 1)), motion)
 
@@ -169,12 +169,12 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
     both[1][0] = replace(both[1][0], goal=Goal.nothing(20))  # which asks for nothing
     pieces = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.7))
     motion = np.concatenate([piece for piece, _ in pieces], axis=1).astype(np.float64)
-    there = two.decode(motion, stands.astype(np.float64))[:, :, 0]
+    there = two.decode(motion, poses.astype(np.float64))[:, :, 0]
     for length, frame in ((4 + 16 + 6, 20 - 4), (6 + 22, 36 - 6)):  # by half of the transition earlier
-        calls = shown[length]
+        calls = inputs[length]
         noise = calls[0][0]
         signal, spread = prior.schedule.at(calls[-1][1])
-        told = (calls[-1][0] - spread * noise) / signal
+        conditioned = (calls[-1][0] - spread * noise) / signal
         turned = 2 * np.array([-0.03, 0.015]) * frame  # the heading's convention: features tell minus half of the turn
         facing = np.array([0.0, np.arctan2(0.8, 0.6)]) + turned
         way = there[1, frame] - there[0, frame]
@@ -185,20 +185,20 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
             c * way[0] - s * way[2],
             c * way[2] + s * way[0],
         ]
-        np.testing.assert_allclose(told[0], expected, atol=1e-3)
+        np.testing.assert_allclose(conditioned[0], expected, atol=1e-3)
         np.testing.assert_allclose(two.relative(begins[length][0], begins[length][1]), expected, atol=1e-3)
     assert len({seed for how in leads for seed in how["seeds"]}) == 6
     assert {how["weight"] for how in leads} == {0.7}
     assert not any(any(how["frozen"]) for how in leads)
-    for how, said in zip(leads, ("a person walks", "a person turns", "a person walks"), strict=True):
+    for how, text in zip(leads, ("a person walks", "a person turns", "a person walks"), strict=True):
         net = block.net(prior)
-        words = [said, "a person jumps" if said == "a person turns" else said]
+        words = [text, "a person jumps" if text == "a person turns" else text]
         np.testing.assert_allclose(how["text"], net.bind(prior.condition(words)).text, atol=1e-5)
 
 
-@pytest.mark.parametrize("asked", [None, 0, 1])
+@pytest.mark.parametrize("spacing", [None, 0, 1])
 def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
-    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch, asked: int | None
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch, spacing: int | None
 ) -> None:
     """A network that always draws two people who walk apart by 0.3 m/s, and always says they stand 1 and 2 m apart;
     who has a goal of his own is not moved for that."""
@@ -214,27 +214,27 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
     monkeypatch.setattr(PairSession, "__call__", constant)
     segments = [Segment("a person walks", 4.0, transition=1.0)] * 3
     both = [tasks._segments_of(segments, i, None, 0) for i in (0, 1)]
-    if asked is not None:
+    if spacing is not None:
         goal = Goal.nothing(80)
         goal.mask[0, 0, 1], goal.positions[0, 0, 1] = True, 0.9  # what he does anyway
-        both[asked] = [replace(segment, goal=goal) for segment in both[asked]]
+        both[spacing] = [replace(segment, goal=goal) for segment in both[spacing]]
     for together, far in ((0.0, (3.0, 4.0)), (1.0, (0.0, 0.8))):
-        drawn = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=together))
-        made = np.concatenate([piece for piece, _ in drawn], axis=1).astype(np.float64)
-        roots = two.decode(made, drawn[0][1])[:, :, 0]
+        pieces = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=together))
+        whole_features = np.concatenate([piece for piece, _ in pieces], axis=1).astype(np.float64)
+        roots = two.decode(whole_features, pieces[0][1])[:, :, 0]
         off = np.linalg.norm((roots[1] - roots[0])[:, [0, 2]] - [1.0, 2.0], axis=-1)
         assert far[0] <= off.max() < far[1]
-        if asked is not None and together:
+        if spacing is not None and together:
             np.testing.assert_allclose(
-                roots[asked, :, 2] - roots[asked, 0, 2], asked * 0.015 * np.arange(240), atol=0.02
+                roots[spacing, :, 2] - roots[spacing, 0, 2], spacing * 0.015 * np.arange(240), atol=0.02
             )
 
 
 def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Prior, block: PairBlock) -> None:
-    net, asked = block.net(prior), {}
+    net, call = block.net(prior), {}
 
     def lead(state: np.ndarray, clean: np.ndarray, level: int) -> np.ndarray:
-        asked.update(state=state, clean=clean, level=level)
+        call.update(state=state, clean=clean, level=level)
         return clean + 1
 
     row = tasks._PairRow((), net, lead, None, None)
@@ -242,9 +242,9 @@ def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Pri
     state, motion = normal((2, 2, 30, 263), 0)
     begin = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
     assert np.array_equal(denoiser._with_pose_guidance(row, 50, motion, begin, state=state), motion + 1)
-    assert asked["level"] == 50
-    assert np.array_equal(asked["state"], join(block.config.places.encode(begin), state))
-    assert np.array_equal(asked["clean"], join(block.config.places.encode(begin), motion))
+    assert call["level"] == 50
+    assert np.array_equal(call["state"], join(block.config.places.encode(begin), state))
+    assert np.array_equal(call["clean"], join(block.config.places.encode(begin), motion))
 
 
 def test_a_path_for_one_of_them_holds_through_all_segments(
@@ -263,14 +263,14 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
     path.mask[:, 0] = [True, False, True]
-    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)))
-    off = np.linalg.norm((made[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
+    duet = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)))
+    off = np.linalg.norm((duet[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
     assert off.mean() < 0.03
-    assert abs(heading(made[1].positions()[:1])[0] - np.pi / 2) < 0.5
+    assert abs(heading(duet[1].positions()[:1])[0] - np.pi / 2) < 0.5
     other = replace(path, positions=path.positions + np.array([0.0, 0.0, 1.0]))
-    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, other=other, steps=3, foot_lock=False)))
-    for one, asked in zip(made, (other, path), strict=True):
-        assert np.linalg.norm((one.root - asked.positions[:, 0])[:, [0, 2]], axis=-1).mean() < 0.03
+    duet = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, other=other, steps=3, foot_lock=False)))
+    for one, goal in zip(duet, (other, path), strict=True):
+        assert np.linalg.norm((one.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() < 0.03
     with pytest.raises(MotionloomError, match="give both"):
         list(compose_pair(prior, block, SEGMENTS, other=other, steps=3))
 

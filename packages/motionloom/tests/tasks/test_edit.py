@@ -80,33 +80,33 @@ def clip_of(kind: str) -> Motion:
 def test_outside_of_the_stretch_everything_stays_to_the_bit(prior: Prior, kind: str) -> None:
     """And inside it does not; the length, rate and skeleton are the clip's."""
     clip = clip_of(kind)
-    made = edit(prior, clip, "a person turns", Redraw([(0.5, 1.2), (2.0, 2.5)]), **FEW)[0]
+    edited = edit(prior, clip, "a person turns", Redraw([(0.5, 1.2), (2.0, 2.5)]), **FEW)[0]
     borders = [round(s * clip.fps) for s in (0.5, 1.2, 2.0, 2.5)]
-    assert (len(made), made.fps, made.skeleton) == (len(clip), clip.fps, clip.skeleton)
-    assert all(same(made, clip, slice(*s)) for s in ((0, borders[0]), borders[1:3], (borders[3], None)))
-    moved = np.linalg.norm(made.positions() - clip.positions(), axis=-1).max(axis=1)
+    assert (len(edited), edited.fps, edited.skeleton) == (len(clip), clip.fps, clip.skeleton)
+    assert all(same(edited, clip, slice(*s)) for s in ((0, borders[0]), borders[1:3], (borders[3], None)))
+    moved = np.linalg.norm(edited.positions() - clip.positions(), axis=-1).max(axis=1)
     assert (moved[borders[0] + 4 : borders[1] - 4] > 1e-3).all()
 
 
 @pytest.mark.parametrize("kind", ["person at 20", "rig", "floating"])
 def test_kept_joints_keep_their_rotations_and_the_root_its_place(prior: Prior, kind: str) -> None:
     clip = clip_of(kind)
-    made = edit(prior, clip, "a person jumps", Redraw(keep=["lower_body"]), **FEW)[0]
+    edited = edit(prior, clip, "a person jumps", Redraw(keep=["lower_body"]), **FEW)[0]
     shift = len(clip.skeleton) > 22
     lower = [j + shift for j in SMPL22.groups["lower_body"]]
     upper = [j + shift for j in (3, 9, 16, 17, 18)]
-    assert np.array_equal(made.rotations[:, lower], clip.rotations[:, lower])
-    np.testing.assert_array_equal(made.positions()[:, lower], clip.positions()[:, lower])
-    assert (np.abs(made.rotations[:, upper] - clip.rotations[:, upper]).max(axis=(0, 2)) > 1e-3).all()
+    assert np.array_equal(edited.rotations[:, lower], clip.rotations[:, lower])
+    np.testing.assert_array_equal(edited.positions()[:, lower], clip.positions()[:, lower])
+    assert (np.abs(edited.rotations[:, upper] - clip.rotations[:, upper]).max(axis=(0, 2)) > 1e-3).all()
     if shift:
-        assert np.array_equal(made.rotations[:, -1], clip.rotations[:, -1]), "fingers are not drawn"
+        assert np.array_equal(edited.rotations[:, -1], clip.rotations[:, -1]), "fingers are not drawn"
 
 
 def test_the_root_alone_can_be_kept(prior: Prior) -> None:
     clip = person(3.0)
-    made = edit(prior, clip, "a person jumps", Redraw([(1.0, 2.0)], keep=["root"]), **FEW)[0]
-    assert np.array_equal(made.root, clip.root)
-    assert not np.array_equal(made.rotations[:, 1], clip.rotations[:, 1])
+    edited = edit(prior, clip, "a person jumps", Redraw([(1.0, 2.0)], keep=["root"]), **FEW)[0]
+    assert np.array_equal(edited.root, clip.root)
+    assert not np.array_equal(edited.rotations[:, 1], clip.rotations[:, 1])
 
 
 def test_the_numbers_of_kept_parts_are_the_published_masks() -> None:
@@ -146,8 +146,8 @@ def test_what_is_drawn_leaves_the_known_frames_without_a_jump() -> None:
     mask = np.ones_like(known, dtype=np.bool_)
     mask[:, 20:40] = False
     mask[:, :, 30] = True
-    drawn = np.where(mask, known, 5 + 0.3 * t)
-    joined = joining(known, mask, 20, 40)(drawn)
+    sampled = np.where(mask, known, 5 + 0.3 * t)
+    joined = joining(known, mask, 20, 40)(sampled)
     assert np.array_equal(joined[mask], known[mask])
     free = [n for n in range(259) if n != 30]
     for border, step in ((19, 1), (40, -1)):
@@ -155,7 +155,7 @@ def test_what_is_drawn_leaves_the_known_frames_without_a_jump() -> None:
         first, second = joined[:, border + step], joined[:, border + 2 * step]
         np.testing.assert_allclose((first - known[:, border])[:, free], pace[:, free], atol=1e-5)
         assert (np.abs((second - first - pace)[:, free]) < 0.5).all(), "a jump would be 4 or more"
-    np.testing.assert_allclose(joined[:, 29:31], drawn[:, 29:31], atol=0.6, rtol=0)
+    np.testing.assert_allclose(joined[:, 29:31], sampled[:, 29:31], atol=0.6, rtol=0)
 
 
 def test_an_open_stretch_is_left_alone() -> None:
@@ -173,10 +173,10 @@ def test_known_frames_come_back_in_the_world(prior: Prior, first: int, last: int
     """Of a clip far from the origin; also where the stretch is at either end."""
     positions = person(3.0).positions()
     window = InpaintWindow(positions, first, last, np.zeros(WIDTH, bool))
-    drawn = inpaint_motion(prior, window, "a person jumps", Sampling(**FEW), seed=0)
+    placed = inpaint_motion(prior, window, "a person jumps", Sampling(**FEW), seed=0)
     outside = [*range(first), *range(last, 59)]
-    np.testing.assert_allclose(drawn.positions[outside], positions[:59][outside], atol=2e-4)
-    assert np.abs(drawn.positions[first + 3 : last - 3] - positions[first + 3 : last - 3]).max() > 1e-3
+    np.testing.assert_allclose(placed.positions[outside], positions[:59][outside], atol=2e-4)
+    assert np.abs(placed.positions[first + 3 : last - 3] - positions[first + 3 : last - 3]).max() > 1e-3
 
 
 def test_little_strength_stays_nearer_to_the_clip(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +188,7 @@ def test_little_strength_stays_nearer_to_the_clip(prior: Prior, monkeypatch: pyt
     monkeypatch.setattr(PriorSession, "__call__", shrunk)
     clip = person(3.0)
     near, far = (
-        np.mean([np.abs(made.positions() - clip.positions()).mean() for made in several])
+        np.mean([np.abs(one.positions() - clip.positions()).mean() for one in several])
         for several in (
             edit(prior, clip, "a person jumps", Redraw(strength=s), seed=1, count=4, **FEW) for s in (0.02, 1.0)
         )
@@ -204,9 +204,9 @@ def test_a_splice_leaves_neither_a_jump_nor_a_kink() -> None:
     """A pose 0.2 rad and 10 cm away, turning at another rate, is met within the fastest step of either motion."""
     clip = person(4.0, 60.0)
     other = move_rigidly(person(4.0, 60.0), rot.rotvec_to_quat(np.array([0, 0.2, 0])), clip.root[0], clip.root[0] + 0.1)
-    made = splice(clip, other, 90, last=160, kept=kept_parts(SMPL22, frozenset(), np.zeros(3, bool)))
-    steps = np.linalg.norm(np.diff(made.positions(), axis=0), axis=-1).max(axis=1)
-    bends = np.linalg.norm(np.diff(made.positions(), n=2, axis=0), axis=-1).max(axis=1)
+    spliced = splice(clip, other, 90, last=160, keep=kept_parts(SMPL22, frozenset(), np.zeros(3, bool)))
+    steps = np.linalg.norm(np.diff(spliced.positions(), axis=0), axis=-1).max(axis=1)
+    bends = np.linalg.norm(np.diff(spliced.positions(), n=2, axis=0), axis=-1).max(axis=1)
     usual = np.linalg.norm(np.diff(clip.positions(), n=2, axis=0), axis=-1).max()
     assert steps[[89, 159]].max() < 1.1 * speeds(clip).max()
     assert bends[[88, 89, 158, 159]].max() < 2 * usual
@@ -217,14 +217,14 @@ def test_a_splice_leaves_neither_a_jump_nor_a_kink() -> None:
 def test_a_looped_clip_can_follow_itself(prior: Prior) -> None:
     """Frame 0, moved behind the last frame, continues it: no joint turns much faster there than the arms swing."""
     clip = person(3.75, 30.0)
-    made = edit(prior, clip, changes=Loop(), **FEW)[0]
-    assert (len(made), same(made, clip, slice(0, 82))) == (112, True)
+    loop = edit(prior, clip, changes=Loop(), **FEW)[0]
+    assert (len(loop), same(loop, clip, slice(0, 82))) == (112, True)
 
     def wrap(motion: Motion) -> float:
         turn = rot.multiply(motion.rotations[0], rot.inverse(motion.rotations[-1]))[1:]
         return float(np.linalg.norm(rot.quat_to_rotvec(turn), axis=-1).max())
 
-    assert wrap(made) < 2 * 0.5 * 2 * np.pi / 30
+    assert wrap(loop) < 2 * 0.5 * 2 * np.pi / 30
     assert wrap(clip) > 3 * 0.5 * 2 * np.pi / 30, "the clip alone would jump"
 
 
@@ -233,56 +233,56 @@ def test_a_clip_that_ends_where_it_began_loops_in_the_world(prior: Prior) -> Non
     still = replace(still, root=np.tile([1.0, 0.9, 2.0], (60, 1)))
     still = replace(still, rotations=still.rotations.copy() * 1.0)
     still.rotations[:, 0] = rot.IDENTITY
-    made = edit(prior, still, changes=Loop(), **FEW)[0]
-    assert np.linalg.norm(made.root[-1] - made.root[0]) < 0.1
+    loop = edit(prior, still, changes=Loop(), **FEW)[0]
+    assert np.linalg.norm(loop.root[-1] - loop.root[0]) < 0.1
 
 
 def test_an_extended_clip_is_the_clip_and_more(prior: Prior) -> None:
     clip = clip_of("rig")
-    made = edit(prior, clip, "a person sits", Extend(1.5), **FEW)[0]
-    assert len(made) == len(clip) + 45
-    assert same(made, clip, slice(0, len(clip)))
-    assert speeds(made)[len(clip) - 1] < 1.5 * speeds(clip).max()
+    longer = edit(prior, clip, "a person sits", Extend(1.5), **FEW)[0]
+    assert len(longer) == len(clip) + 45
+    assert same(longer, clip, slice(0, len(clip)))
+    assert speeds(longer)[len(clip) - 1] < 1.5 * speeds(clip).max()
 
 
 def test_versions_have_their_own_seeds(prior: Prior) -> None:
     clip = person(3.0)
-    said: list[tuple[int, int]] = []
+    reports: list[tuple[int, int]] = []
     two = edit(
-        prior, clip, "a person jumps", Redraw([(1, 2)]), count=2, seed=4, progress=lambda *p: said.append(p), **FEW
+        prior, clip, "a person jumps", Redraw([(1, 2)]), count=2, seed=4, progress=lambda *p: reports.append(p), **FEW
     )
-    assert said == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert reports == [(1, 4), (2, 4), (3, 4), (4, 4)]
     alone = edit(prior, clip, "a person jumps", Redraw([(1, 2)]), seed=5, **FEW)[0]
     assert np.array_equal(two[1].rotations, alone.rotations)
     assert not np.array_equal(two[0].rotations, two[1].rotations)
 
 
 def test_the_skeleton_can_be_the_persons(prior: Prior) -> None:
-    made = edit(prior, clip_of("rig"), "a person jumps", Redraw([(1, 2)]), skeleton="smpl", **FEW)[0]
-    assert made.skeleton == SMPL22
-    assert made.fps == 30
+    edited = edit(prior, clip_of("rig"), "a person jumps", Redraw([(1, 2)]), skeleton="smpl", **FEW)[0]
+    assert edited.skeleton == SMPL22
+    assert edited.fps == 30
 
 
 def test_a_long_clip_costs_what_its_window_costs(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
     """The network sees at most 8 seconds of a clip of half a minute."""
-    seen: list[int] = []
+    lengths: list[int] = []
     forward = type(prior.net).__call__
 
     def counted(net, x, *rest):
-        seen.append(x.shape[1])
+        lengths.append(x.shape[1])
         return forward(net, x, *rest)
 
     monkeypatch.setattr(type(prior.net), "__call__", counted)
     edit(prior, person(30.0), "a person jumps", Redraw([(14, 16)]), **FEW)
-    assert 0 < max(seen) <= 160
+    assert 0 < max(lengths) <= 160
 
 
 def test_manner_keeps_places() -> None:
     """Hips that move under a still root are where the moving root had them."""
     clip = from_smpl22(person(1.0), rig())
-    told = match_root(floating(clip), clip)
-    np.testing.assert_allclose(told.positions()[:, 1:], clip.positions()[:, 1:], atol=1e-9)
-    assert np.array_equal(told.root, np.zeros((20, 3)))
+    moved = match_root(floating(clip), clip)
+    np.testing.assert_allclose(moved.positions()[:, 1:], clip.positions()[:, 1:], atol=1e-9)
+    assert np.array_equal(moved.root, np.zeros((20, 3)))
 
 
 def test_the_person_at_20_goes_straight_on() -> None:
@@ -302,15 +302,16 @@ def test_standing_tells_the_facing() -> None:
     assert ground_pose_at(clip, 0).facing == pytest.approx(np.pi / 2, abs=1e-6)
 
 
-def asked_and_edited(prior: Prior, asked: dict) -> None:
+def edited_with(prior: Prior, options: dict) -> None:
     """Changes by single options, as the command line and the server ask for them."""
-    options = {key: asked[key] for key in asked if key in ("keep", "between", "loop", "extend", "strength", "blend")}
-    changes = changes_from_options(asked.get("text", ""), **options)
-    edit(prior, person(3.0), changes=changes, **{key: asked[key] for key in asked if key not in options})
+    names = ("keep", "between", "loop", "extend", "strength", "blend")
+    own = {name: value for name, value in options.items() if name in names}
+    changes = changes_from_options(options.get("text", ""), **own)
+    edit(prior, person(3.0), changes=changes, **{key: value for key, value in options.items() if key not in own})
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("options", "sentence"),
     [
         ({}, "nothing to change"),
         ({"text": " "}, "nothing to change"),
@@ -338,9 +339,9 @@ def asked_and_edited(prior: Prior, asked: dict) -> None:
     ],
     ids=str,
 )
-def test_what_cannot_be_asked_is_refused(prior: Prior, asked: dict, said: str) -> None:
-    with pytest.raises(MotionloomError, match=said) as caught:
-        asked_and_edited(prior, asked)
+def test_what_cannot_be_asked_is_refused(prior: Prior, options: dict, sentence: str) -> None:
+    with pytest.raises(MotionloomError, match=sentence) as caught:
+        edited_with(prior, options)
     assert "\n" not in str(caught.value)
 
 

@@ -27,18 +27,18 @@ def held(
     return FixedJoints(source, (FixedPart(joints, spans),), align)
 
 
-def future(hold: FixedJoints | None, *, past: Motion = PAST, seconds: float = 0.8, **asked) -> Motion:
-    made = predict(PREDICTOR, past, count=1, seconds=seconds, steps=2, hold=hold, **asked)[0]
-    return made.frames(len(past), len(made))
+def future(hold: FixedJoints | None, *, past: Motion = PAST, seconds: float = 0.8, **options) -> Motion:
+    motion = predict(PREDICTOR, past, count=1, seconds=seconds, steps=2, hold=hold, **options)[0]
+    return motion.frames(len(past), len(motion))
 
 
 @pytest.mark.parametrize("group", ["lower_body", "left_arm", "torso", "left_knee", "head"])
 def test_held_joints_take_the_local_rotations_of_the_source_bit_for_bit(group: str) -> None:
-    made, joints = future(held(group)), sorted(SMPL22.resolve([group]))
+    motion, joints = future(held(group)), sorted(SMPL22.resolve([group]))
     chosen = [j for j in joints if j != 0]  # the pelvis is moved with the aligned source
-    assert np.array_equal(made.rotations[:, chosen], SOURCE.rotations[:24, chosen])
+    assert np.array_equal(motion.rotations[:, chosen], SOURCE.rotations[:24, chosen])
     others = [j for j in range(22) if j not in joints]
-    assert not np.allclose(made.rotations[:, others], SOURCE.rotations[:24, others], atol=1e-3)
+    assert not np.allclose(motion.rotations[:, others], SOURCE.rotations[:24, others], atol=1e-3)
 
 
 @pytest.mark.parametrize("moved", [False, True])
@@ -46,9 +46,9 @@ def test_held_joints_of_another_body_and_what_hangs_on_them(moved: bool) -> None
     skeleton = rig()
     past, source = (Motion(skeleton, 30.0, m.root, _on_rig(m)) for m in (PAST, SOURCE))
     past, source = (floating(m) if moved else m for m in (past, source))
-    made = future(held("right_arm", source=source), past=past)
+    motion = future(held("right_arm", source=source), past=past)
     joints = [skeleton.index(n) for n in ("r_collar", "r_shoulder", "r_elbow", "r_wrist", "r_finger")]
-    assert np.array_equal(made.rotations[:, joints], source.rotations[:24, joints])
+    assert np.array_equal(motion.rotations[:, joints], source.rotations[:24, joints])
 
 
 def _on_rig(motion: Motion) -> np.ndarray:
@@ -59,13 +59,13 @@ def _on_rig(motion: Motion) -> np.ndarray:
 
 
 def test_the_way_of_an_aligned_source_is_taken_and_goes_on_where_the_past_ends() -> None:
-    made = future(held("root"))
+    motion = future(held("root"))
     steps = turned(
         np.diff(SOURCE.root[:24], axis=0), ground_pose_at(PAST, 29).facing - ground_pose_at(SOURCE, 0).facing
     )
-    np.testing.assert_allclose(np.diff(made.root, axis=0), steps, atol=1e-9)
-    np.testing.assert_allclose(made.root[:, 1], SOURCE.root[:24, 1], atol=1e-12)
-    first = (made.root[0] - PAST.root[-1])[[0, 2]]
+    np.testing.assert_allclose(np.diff(motion.root, axis=0), steps, atol=1e-9)
+    np.testing.assert_allclose(motion.root[:, 1], SOURCE.root[:24, 1], atol=1e-12)
+    first = (motion.root[0] - PAST.root[-1])[[0, 2]]
     np.testing.assert_allclose(first, (PAST.root[-1] - PAST.root[-2])[[0, 2]], atol=0.01)
 
 
@@ -79,11 +79,11 @@ def test_a_source_that_goes_on_already_and_one_that_is_not_to_be_aligned_stay_bi
 
 def test_a_part_that_is_held_for_a_while_is_led_there_and_back() -> None:
     spans = ((0.3, 0.5),)
-    made = future(held("left_arm", spans=spans))
+    motion = future(held("left_arm", spans=spans))
     times, joints = np.arange(1, 25) / 30, sorted(SMPL22.resolve(["left_arm"]))
     inside = (times > 0.3 - 1e-9) & (times < 0.5 + 1e-9)
     assert inside.sum() == 7
-    same = (made.rotations[:, joints] == SOURCE.rotations[:24, joints]).all((1, 2))
+    same = (motion.rotations[:, joints] == SOURCE.rotations[:24, joints]).all((1, 2))
     assert np.array_equal(same, inside)
     ready = prepare_hold(Past.of(PREDICTOR, PAST), held("left_arm", spans=spans), 0.8)
     assert ready is not None
@@ -104,9 +104,9 @@ def test_what_is_held_in_a_later_piece_is_the_sources_of_that_moment(monkeypatch
 
 
 def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:
-    made = future(held("left_arm", source=SOURCE.frames(0, 12)))
+    motion = future(held("left_arm", source=SOURCE.frames(0, 12)))
     joints = sorted(SMPL22.resolve(["left_arm"]))
-    assert np.array_equal(made.rotations[:12, joints], SOURCE.rotations[:12, joints])
+    assert np.array_equal(motion.rotations[:12, joints], SOURCE.rotations[:12, joints])
     ready = prepare_hold(Past.of(PREDICTOR, PAST), held("left_arm", source=SOURCE.frames(0, 12)), 0.8)
     assert ready is not None
     share = np.append(ready.joints[:, 16], 0)
@@ -118,9 +118,9 @@ def test_what_is_held_is_shown_to_the_network_and_changes_the_free_joints() -> N
     kicking = SOURCE.rotations.copy()
     kicking[:, [1, 2], 1] += 0.4
     other = Motion(SMPL22, 30.0, SOURCE.root, rot.normalize(kicking))
-    made, free = (joints22(future(held("lower_body", source=s, align=False))) for s in (SOURCE, other))
+    whole, free = (joints22(future(held("lower_body", source=s, align=False))) for s in (SOURCE, other))
     arms = sorted(SMPL22.resolve(["left_arm", "right_arm"]))
-    apart = (made - made[:, :1])[:, arms] - (free - free[:, :1])[:, arms]
+    apart = (whole - whole[:, :1])[:, arms] - (free - free[:, :1])[:, arms]
     assert np.abs(apart).max() > 1e-3
 
 
@@ -133,14 +133,14 @@ def test_the_network_sees_the_source_at_its_own_moments_from_the_first_predicted
     )
     assert ready is not None
     real = joints22(after)[1::2]
-    told = ready.known(1, 31)
-    assert told is not None
-    assert np.abs((told.positions - told.positions[:, :1]) - (real - real[:, :1])[:30]).max() < 0.01
-    assert np.array_equal(told.mask.any(axis=1), np.arange(1, 31) / 30 <= 0.5 + 1e-9)
-    assert set(np.flatnonzero(told.mask[0])) == {0, *SMPL22.resolve(["left_arm"])}
+    known = ready.known(1, 31)
+    assert known is not None
+    assert np.abs((known.positions - known.positions[:, :1]) - (real - real[:, :1])[:30]).max() < 0.01
+    assert np.array_equal(known.mask.any(axis=1), np.arange(1, 31) / 30 <= 0.5 + 1e-9)
+    assert set(np.flatnonzero(known.mask[0])) == {0, *SMPL22.resolve(["left_arm"])}
     later = ready.known(11, 31)
     assert later is not None
-    assert np.array_equal(later.positions, told.positions[10:])
+    assert np.array_equal(later.positions, known.positions[10:])
     assert ready.known(16, 31) is None
 
 
@@ -148,11 +148,11 @@ def test_parts_laid_over_a_motion_are_exact_at_weight_one_and_nothing_at_none() 
     one, other = PAST, move_rigidly(SOURCE, rot.IDENTITY, np.zeros(3), np.ones(3)).frames(0, 30)
     joints = np.zeros((30, 22))
     joints[5:10, 3], joints[10:, 3] = 0.5, 1
-    made = overlay(one, other, joints, joints[:, 3])
-    assert np.array_equal(made.rotations[:5], one.rotations[:5])
-    assert np.array_equal(made.rotations[10:, 3], other.rotations[10:, 3])
-    assert np.array_equal(made.root[10:], other.root[10:])
-    np.testing.assert_allclose(made.root[5:10], (one.root + other.root)[5:10] / 2)
+    mixed = overlay(one, other, joints, joints[:, 3])
+    assert np.array_equal(mixed.rotations[:5], one.rotations[:5])
+    assert np.array_equal(mixed.rotations[10:, 3], other.rotations[10:, 3])
+    assert np.array_equal(mixed.root[10:], other.root[10:])
+    np.testing.assert_allclose(mixed.root[5:10], (one.root + other.root)[5:10] / 2)
 
 
 MISTAKES = {

@@ -61,8 +61,8 @@ def test_frames_are_the_sum_of_the_segments_rounded(prior: Prior) -> None:
         segments = [Segment(WALK, s, transition=0.2) for s in seconds]
         frames = [round(s * 20) for s in seconds]
         assert [len(piece) for piece in features(prior, segments, steps=1)] == frames
-        made = whole(prior, segments, steps=1)
-        assert (len(made), made.fps) == (sum(frames), 20)
+        motion = whole(prior, segments, steps=1)
+        assert (len(motion), motion.fps) == (sum(frames), 20)
 
 
 def test_company_and_patch_do_not_matter(prior: Prior) -> None:
@@ -81,9 +81,9 @@ def test_company_and_patch_do_not_matter(prior: Prior) -> None:
 def test_one_segment_is_drawn_as_a_single_motion_is(prior: Prior) -> None:
     """With one frame per token there is nothing to settle: the published net's `sample_features`, to the rounding."""
     one = replace(prior, net=tiny.prior(tiny.PUBLISHED).net)
-    made = features(one, [Segment(TURN, 1.0, guidance=4.0)], seed=9)[0]
+    piece = features(one, [Segment(TURN, 1.0, guidance=4.0)], seed=9)[0]
     other = sample_features(one, [TURN], [20], seeds=[9], steps=3, guidance=4.0)[0]
-    np.testing.assert_allclose(made, other, atol=1e-5, rtol=0)
+    np.testing.assert_allclose(piece, other, atol=1e-5, rtol=0)
 
 
 def test_several_takes_at_once_are_those_that_are_drawn_alone(prior: Prior) -> None:
@@ -91,16 +91,16 @@ def test_several_takes_at_once_are_those_that_are_drawn_alone(prior: Prior) -> N
     segments = [Segment(WALK, 1.0, transition=0.3), Segment(TURN, 1.2, transition=0.2), Segment(WALK, 0.8)]
     path = on_ground(np.linspace([0.5, 0.0], [1.0, 2.0], 60))
     for more in ({}, {"batch_size": 4}, {"path": path}):
-        seen: list[Denoised] = []
+        denoised: list[Denoised] = []
         alone = {name: value for name, value in more.items() if name != "batch_size"}
-        with watching(seen.append):
+        with watching(denoised.append):
             takes = list(compose_takes(prior, segments, steps=3, seed=7, count=4, **more))
         assert len(takes) == 4
         for number, take in enumerate(takes):
             expected = whole(prior, segments, seed=7 + number, **alone)
             assert np.abs(take.positions() - expected.positions()).max() < 1e-3
-            own = [one for one in seen if one.rows == (number,)]
-            assert [one.done for one in own][-1] == 3
+            own = [one for one in denoised if one.rows == (number,)]
+            assert [one.move for one in own][-1] == 3
             assert own[-1].positions().shape == (1, 1, 60, 22, 3)
         assert np.abs(takes[0].positions() - takes[1].positions()).max() > 1e-2
 
@@ -150,9 +150,9 @@ def test_pieces_meet_at_the_seams(prior: Prior) -> None:
 def test_the_network_does_as_much_for_each_segment(prior: Prior) -> None:
     """Row moves are segments times steps: time is linear."""
     for count in (1, 4, 9):
-        said: list[int] = []
-        features(prior, [Segment(WALK, 1.0, transition=0.3)] * count, steps=4, progress=said.append)
-        assert sum(said) == 4 * count
+        counts: list[int] = []
+        features(prior, [Segment(WALK, 1.0, transition=0.3)] * count, steps=4, progress=counts.append)
+        assert sum(counts) == 4 * count
 
 
 def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(prior: Prior) -> None:
@@ -166,12 +166,12 @@ def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(pri
         finally:
             read.append("closed")
 
-    made = compose(prior, endless(), steps=1, batch_size=2)
+    blocks = compose(prior, endless(), steps=1, batch_size=2)
     assert not read
-    block = next(made)
+    block = next(blocks)
     assert len(block) > 0
     assert len(read) < 20
-    made.close()  # type: ignore[attr-defined]
+    blocks.close()  # type: ignore[attr-defined]
     assert read[-1] == "closed"
     assert len(list(islice(long_features(prior, endless(), steps=2), 3))) == 3
 
@@ -190,22 +190,22 @@ def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) 
     np.testing.assert_allclose(humanml.decode_positions(first)[20, 0, ::2], (0.3, 0.5), atol=0.01)
     pieces = features(prior, segments, past=Past.of(clip))
     place = PlacedMotion(pieces[0], Past.of(clip).end).end
-    seen = humanml.decode_positions(pieces[1].astype(np.float64))
-    np.testing.assert_allclose(seen[20, 0, ::2], (0.3, 0.5), atol=0.1)
-    made = whole(prior, segments, start=clip, foot_lock=False)
-    np.testing.assert_allclose(made.root[60, ::2], place.to_world(np.array([0.3, 0, 0.5]))[::2], atol=0.01)
+    places = humanml.decode_positions(pieces[1].astype(np.float64))
+    np.testing.assert_allclose(places[20, 0, ::2], (0.3, 0.5), atol=0.1)
+    motion = whole(prior, segments, start=clip, foot_lock=False)
+    np.testing.assert_allclose(motion.root[60, ::2], place.to_world(np.array([0.3, 0, 0.5]))[::2], atol=0.01)
 
 
 def test_a_path_is_followed_to_its_end(prior: Prior) -> None:
     """A circle around (5, -4) through 12 segments; the last second is as near as the first."""
     t = np.arange(12 * 30) / 20
     points = np.stack([5 + 3 * np.sin(0.3 * t), -4 + 3 * np.cos(0.3 * t)], axis=-1)
-    made = whole(prior, [Segment(WALK, 1.5) for _ in range(12)], path=on_ground(points))
-    apart = np.linalg.norm(made.root[:, ::2] - points, axis=-1)
+    motion = whole(prior, [Segment(WALK, 1.5) for _ in range(12)], path=on_ground(points))
+    apart = np.linalg.norm(motion.root[:, ::2] - points, axis=-1)
     assert apart.max() < 0.02
     assert apart[-20:].mean() < apart[:20].mean() + 0.005
     way = np.arctan2(*np.diff(points, axis=0).T)
-    turn = (heading(made.positions())[:-1] - way + np.pi) % (2 * np.pi) - np.pi
+    turn = (heading(motion.positions())[:-1] - way + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(turn[30:]).mean() < 1.0
 
 
@@ -215,8 +215,8 @@ def test_a_motion_goes_on_where_a_clip_ends(prior: Prior, turn: float) -> None:
     quaternion = np.array([np.cos(turn / 2), 0, np.sin(turn / 2), 0])
     clip = move_rigidly(person(61 / 30, 30.0), quaternion, np.zeros(3), np.array([4.0, 0, -7.0]))
     assert len(clip) == 61  # two seconds: frames 0, 3, 6, ... are frames at 20 fps
-    made = whole(prior, [Segment(WALK, 2.0)], start=clip, foot_lock=False)
-    old, new = to_smpl22(clip).resample(20).positions(), made.positions()  # which stands on the floor
+    motion = whole(prior, [Segment(WALK, 2.0)], start=clip, foot_lock=False)
+    old, new = to_smpl22(clip).resample(20).positions(), motion.positions()  # which stands on the floor
     step = old[-1] - old[-2]
     assert np.linalg.norm(new[0] - (old[-1] + step), axis=-1).max() < 0.05
     apart = np.linalg.norm((new[1] - new[0]) - step, axis=-1)
@@ -230,7 +230,7 @@ def test_a_second_of_a_past_is_seen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "asked", "said"),
+    ("seconds", "options", "sentence"),
     [
         ([1.0, 0.5, 1.0], {}, r"segment 2 \('a person walks'\) of 0.5 s is shorter"),
         ([0.05], {}, "segment 1 .* is shorter"),
@@ -246,9 +246,9 @@ def test_a_second_of_a_past_is_seen() -> None:
     ],
     ids=str,
 )
-def test_what_cannot_be_asked_is_reported(prior: Prior, seconds: list[float], asked: dict, said: str) -> None:
-    with pytest.raises(MotionloomError, match=said) as caught:
-        list(compose(prior, [Segment(WALK, s) for s in seconds], **{"steps": 1, **asked}))
+def test_what_cannot_be_asked_is_reported(prior: Prior, seconds: list[float], options: dict, sentence: str) -> None:
+    with pytest.raises(MotionloomError, match=sentence) as caught:
+        list(compose(prior, [Segment(WALK, s) for s in seconds], **{"steps": 1, **options}))
     assert "\n" not in str(caught.value)
 
 

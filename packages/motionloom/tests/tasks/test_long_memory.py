@@ -53,12 +53,12 @@ class Halves:
 def prior(monkeypatch: pytest.MonkeyPatch) -> Prior:
     """A network whose guess is its input, and bodies that only stand where the pelvis is: nothing here costs time."""
 
-    def stands(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
+    def standing(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
         turns = np.zeros((len(places), 22, 4))
         turns[..., 3] = 1.0
         return Motion(SMPL22, fps, places.positions[:, 0], turns)
 
-    monkeypatch.setattr(body, "solve", stands)
+    monkeypatch.setattr(body, "solve", standing)
     mean, std = np.zeros(263, np.float32), np.full(263, 0.01, np.float32)
     return Prior(Halves(), cosine(20), mean, std, Words(), Card("tiny"))  # type: ignore[arg-type]
 
@@ -66,28 +66,28 @@ def prior(monkeypatch: pytest.MonkeyPatch) -> Prior:
 @pytest.mark.slow
 def test_an_hour_of_720_segments_runs_in_constant_memory(prior: Prior) -> None:
     """The most traced memory, arrays and all, in each third of the hour is that in the first."""
-    asked = 0
+    count = 0
 
     def segments() -> Iterator[Segment]:
-        nonlocal asked
+        nonlocal count
         for number in range(SEGMENTS):
-            asked = number + 1
+            count = number + 1
             yield Segment(f"segment {number}", SECONDS)
 
-    frames, third, seen = 0, SEGMENTS * SECONDS * 20 / 3, []
+    frames, third, sizes = 0, SEGMENTS * SECONDS * 20 / 3, []
     tracemalloc.start()
     try:
         for number, piece in enumerate(compose(prior, segments(), steps=2)):
             frames += len(piece)
             if number % 4 == 0:  # rows come out in bunches: what is alive goes up and down with them
-                ahead = asked - frames / (20 * SECONDS)  # segments are read as the walk gets there
+                ahead = count - frames / (20 * SECONDS)  # segments are read as the walk gets there
                 traced = tracemalloc.get_traced_memory()[0] / 2**20
-                seen.append((frames // third, traced, ahead))
+                sizes.append((frames // third, traced, ahead))
         peak = tracemalloc.get_traced_memory()[1] / 2**20
     finally:
         tracemalloc.stop()
     assert frames == SEGMENTS * SECONDS * 20
-    most = [np.max([row[1:] for row in seen if row[0] == part], axis=0) for part in range(3)]
+    most = [np.max([row[1:] for row in sizes if row[0] == part], axis=0) for part in range(3)]
     for later in most[1:]:
         assert (later <= 1.05 * most[0] + [0.2, 0]).all(), most
     assert most[0][1] < 60

@@ -37,7 +37,7 @@ from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers
 
 FRAMES = 14
-SAID = ["a person walks", "a person turns left"]
+PROMPTS = ["a person walks", "a person turns left"]
 
 
 @pytest.fixture(scope="module")
@@ -50,100 +50,100 @@ def block(prior: Prior) -> PairBlock:
     return block_of(prior)
 
 
-def features(prior: Prior, block: PairBlock, prompts: list[str], seeds: list[int], **given):
-    return pair_features(prior, block.net(prior), prompts, FRAMES, seeds=seeds, steps=4, **given)
+def features(prior: Prior, block: PairBlock, prompts: list[str], seeds: list[int], **options):
+    return pair_features(prior, block.net(prior), prompts, FRAMES, seeds=seeds, steps=4, **options)
 
 
 def both_known(prior: Prior, block: PairBlock, count: int = 5) -> Observed:
     """A state whose first frames and D are known."""
     first = normal((2, count, 263), 3) * prior.std + prior.mean
-    stands = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    return known_state(block.net(prior), PairMotion(first[None], stands[None]), FRAMES)
+    poses = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    return known_state(block.net(prior), PairMotion(first[None], poses[None]), FRAMES)
 
 
 @pytest.mark.parametrize("known", [False, True], ids=["free", "prefix"])
 def test_exchanged_people_get_exchanged_motions(prior: Prior, block: PairBlock, known: bool) -> None:
     observed = both_known(prior, block)
-    given = {"edits": PairEdits(observed)} if known else {}
+    options = {"edits": PairEdits(observed)} if known else {}
     exchanged = replace(observed, values=np.flip(observed.values, 0), mask=np.flip(observed.mask, 0))
     turned = {"edits": PairEdits(exchanged)} if known else {}
-    one, stands = features(prior, block, SAID, [1, 2], **given)
-    other, exchanged = features(prior, block, SAID[::-1], [2, 1], **turned)
+    one, poses = features(prior, block, PROMPTS, [1, 2], **options)
+    other, exchanged = features(prior, block, PROMPTS[::-1], [2, 1], **turned)
     np.testing.assert_allclose(one[0], np.flip(other[0], 0), rtol=0, atol=1e-4)
     expected = two.relative(exchanged[0, 1], exchanged[0, 0])
-    np.testing.assert_allclose(two.relative(stands[0, 0], stands[0, 1]), expected, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(two.relative(poses[0, 0], poses[0, 1]), expected, rtol=0, atol=1e-4)
     assert not np.allclose(one[0, 0], one[0, 1], atol=1e-2)
 
 
 def test_a_pair_is_the_same_in_any_company(prior: Prior, block: PairBlock) -> None:
     """Nine pairs are more than are denoised at once."""
     seeds = list(range(18))
-    many, stands = features(prior, block, SAID * 9, seeds)
+    many, poses = features(prior, block, PROMPTS * 9, seeds)
     for number in (0, 7, 8):
-        alone, there = features(prior, block, SAID, seeds[2 * number : 2 * number + 2])
+        alone, there = features(prior, block, PROMPTS, seeds[2 * number : 2 * number + 2])
         np.testing.assert_allclose(many[number], alone[0], rtol=0, atol=1e-3)
-        np.testing.assert_allclose(stands[number], there[0], rtol=1e-5, atol=1e-3)
+        np.testing.assert_allclose(poses[number], there[0], rtol=1e-5, atol=1e-3)
 
 
 def test_people_who_do_not_listen_are_the_priors_own(prior: Prior) -> None:
-    made, _ = features(prior, block_of(prior, fresh=True), SAID, [3, 4])
-    alone = sample_features(prior, SAID, [FRAMES] * 2, seeds=[3, 4], steps=4)
-    np.testing.assert_allclose(made[0], np.stack(alone), rtol=0, atol=1e-5)
+    pair, _ = features(prior, block_of(prior, fresh=True), PROMPTS, [3, 4])
+    alone = sample_features(prior, PROMPTS, [FRAMES] * 2, seeds=[3, 4], steps=4)
+    np.testing.assert_allclose(pair[0], np.stack(alone), rtol=0, atol=1e-5)
 
 
 def test_the_other_persons_words_matter_to_people_who_listen(prior: Prior, block: PairBlock) -> None:
-    one, _ = features(prior, block, SAID, [3, 4])
-    other, _ = features(prior, block, [SAID[0], "a person jumps"], [3, 4])
+    one, _ = features(prior, block, PROMPTS, [3, 4])
+    other, _ = features(prior, block, [PROMPTS[0], "a person jumps"], [3, 4])
     assert np.abs(one[0, 0] - other[0, 0]).max() > 1e-3
 
 
 def test_what_is_known_is_shown_without_noise_and_comes_back(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen: list[tuple[np.ndarray, int]] = []
+    states: list[tuple[np.ndarray, int]] = []
     forward = PairSession.__call__
 
     def recorded(net: PairSession, x: np.ndarray, level: int, bound) -> np.ndarray:
-        seen.append((x[:2].copy(), level))
+        states.append((x[:2].copy(), level))
         return forward(net, x, level, bound)
 
     monkeypatch.setattr(PairSession, "__call__", recorded)
     observed = both_known(prior, block)
     state, mask = observed.values, observed.mask
-    made, _ = features(prior, block, SAID, [1, 2], edits=PairEdits(observed))
-    assert [level for _, level in seen] == list(levels(prior.schedule, 4, spacing="early"))[:-1]
-    for x, level in seen:
+    pair, _ = features(prior, block, PROMPTS, [1, 2], edits=PairEdits(observed))
+    assert [level for _, level in states] == list(levels(prior.schedule, 4, spacing="early"))[:-1]
+    for x, level in states:
         np.testing.assert_allclose(x[mask], prior.schedule.at(level)[0] * state[mask], atol=1e-5)
     expected = state[:, 1:6] * prior.std + prior.mean
-    np.testing.assert_allclose(made[0, :, :5], expected, rtol=0, atol=1e-6)
-    assert np.abs(made[0, :, 5:] - prior.mean).max() > 1e-3
+    np.testing.assert_allclose(pair[0, :, :5], expected, rtol=0, atol=1e-6)
+    assert np.abs(pair[0, :, 5:] - prior.mean).max() > 1e-3
 
 
 def test_a_change_of_guesses_sees_one_persons_frames_and_no_more(prior: Prior, block: PairBlock) -> None:
-    observed, seen = both_known(prior, block), []
+    observed, frames = both_known(prior, block), []
     state, mask = observed.values, observed.mask
 
     def change(guess: np.ndarray, level: int) -> np.ndarray:
-        seen.append(guess)
+        frames.append(guess)
         return np.where(mask[1, 1:], guess, 0.5)
 
-    made, _ = features(prior, block, SAID, [1, 2], edits=PairEdits(observed, [None, change]))
-    assert len(seen) == 5
-    assert all(np.array_equal(guess[:5], state[1, 1:6]) for guess in seen)
-    assert seen[0].shape == (FRAMES, 263)
+    pair, _ = features(prior, block, PROMPTS, [1, 2], edits=PairEdits(observed, [None, change]))
+    assert len(frames) == 5
+    assert all(np.array_equal(guess[:5], state[1, 1:6]) for guess in frames)
+    assert frames[0].shape == (FRAMES, 263)
     np.testing.assert_allclose(
-        made[0, 1, 5:], np.broadcast_to(0.5 * prior.std + prior.mean, (FRAMES - 5, 263)), atol=1e-5
+        pair[0, 1, 5:], np.broadcast_to(0.5 * prior.std + prior.mean, (FRAMES - 5, 263)), atol=1e-5
     )
-    assert np.abs(made[0, 0, 5:] - made[0, 1, 5:]).max() > 1e-2
+    assert np.abs(pair[0, 0, 5:] - pair[0, 1, 5:]).max() > 1e-2
 
 
 def test_duets_are_repeated_by_their_seeds(prior: Prior, block: PairBlock) -> None:
     few = {"seconds": 0.6, "steps": 2, "foot_lock": False}
-    several = generate_pair(prior, block, SAID[0], count=2, seed=4, **few)
-    again = generate_pair(prior, block, SAID[0], count=1, seed=4, **few)
+    several = generate_pair(prior, block, PROMPTS[0], count=2, seed=4, **few)
+    again = generate_pair(prior, block, PROMPTS[0], count=1, seed=4, **few)
     np.testing.assert_allclose(several[0][1].positions(), again[0][1].positions(), atol=1e-4)
     assert np.abs(several[1][1].positions() - again[0][1].positions()).max() > 1e-2
-    [second] = generate_pair(prior, block, SAID[0], count=1, first=1, seed=4, **few)
+    [second] = generate_pair(prior, block, PROMPTS[0], count=1, first=1, seed=4, **few)
     np.testing.assert_allclose(several[1][1].positions(), second[1].positions(), atol=1e-4)
     added = {"seed": 4, "seconds": 0.5, "steps": 2, "foot_lock": False}
     for make in (
@@ -163,10 +163,10 @@ def test_seeds_of_people_go_with_them() -> None:
 
 def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) -> None:
     few = {"steps": 4, "bodies": False}
-    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, seed=1, foot_lock=False, **few)
-    made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), **few)
-    alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in made[0]])
-    expected = two.to_world(alone, stands[0].astype(np.float64)[:, None, None])
+    [duet] = generate_pair(prior, block, PROMPTS[0], seconds=0.7, seed=1, foot_lock=False, **few)
+    pair, poses = pair_features(prior, block.net(prior), [PROMPTS[0]] * 2, 14, seeds=person_seeds(1, 0), **few)
+    alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in pair[0]])
+    expected = two.to_world(alone, poses[0].astype(np.float64)[:, None, None])
     np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
 
 
@@ -183,7 +183,7 @@ def walk(frames: int) -> Goal:
 def test_a_path_leads_one_of_the_two(prior: Prior, block: PairBlock, person: int) -> None:
     goal = walk(40)
     [duet] = generate_pair(
-        prior, block, SAID[0], goals=(goal, None) if person == 0 else (None, goal), steps=4, seed=2, foot_lock=False
+        prior, block, PROMPTS[0], goals=(goal, None) if person == 0 else (None, goal), steps=4, seed=2, foot_lock=False
     )
     off = [np.linalg.norm((m.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() for m in duet]
     assert off[person] < 0.02 < off[1 - person]
@@ -194,26 +194,26 @@ def test_two_people_with_a_goal_each_follow_both(prior: Prior, block: PairBlock)
     first = walk(40)
     there = GroundPose(2.0, 0.5, 1.0)
     second = first.placed(there)
-    [duet] = generate_pair(prior, block, SAID[0], goals=(first, second), steps=4, seed=2, foot_lock=False)
+    [duet] = generate_pair(prior, block, PROMPTS[0], goals=(first, second), steps=4, seed=2, foot_lock=False)
     for motion, goal in zip(duet, (first, second), strict=True):
         assert np.linalg.norm((motion.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() < 0.02
     with pytest.raises(MotionloomError, match="40 and 30 frames"):
-        generate_pair(prior, block, SAID[0], goals=(walk(40), walk(30)))
+        generate_pair(prior, block, PROMPTS[0], goals=(walk(40), walk(30)))
 
 
 def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whoever starts at the goal's place, the other is seen from him as the drawn stands say."""
-    drawn = []
+    pairs = []
     real = pair.pair_features
-    monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
+    monkeypatch.setattr(pair, "pair_features", lambda *a, **k: pairs.append(real(*a, **k)) or pairs[-1])
     numbers = humanml.motion_to_features(one_person(2.0))
     human = replace(prior, mean=numbers.mean(0), std=np.full(263, 0.02, np.float32))  # whom a body can be fitted to
-    [duet] = generate_pair(human, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False, bodies=False)
-    stands = drawn[0][1][0].astype(np.float64)
+    [duet] = generate_pair(human, block, PROMPTS[0], goals=(None, walk(40)), steps=3, foot_lock=False, bodies=False)
+    poses = pairs[0][1][0].astype(np.float64)
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
-    other = GroundPose.of_numbers(two.compose(there, two.relative(stands[1], stands[0])))
+    other = GroundPose.of_numbers(two.compose(there, two.relative(poses[1], poses[0])))
     np.testing.assert_allclose(duet[0].root[0, [0, 2]], [other.x, other.z], atol=0.05)
 
 
@@ -232,12 +232,12 @@ def test_one_ground_for_two_bodies_is_undone(prior: Prior) -> None:
 def test_pasts_stay_bit_for_bit_and_go_on_without_a_jump(prior: Prior, block: PairBlock) -> None:
     past = walkers(1.2)
     [duet] = complete_pair(prior, block, past, steps=3, seconds=0.5)
-    for made, old in zip(duet, past, strict=True):
-        assert len(made) == len(old) + round(0.5 * old.fps)
-        assert made.skeleton == old.skeleton
-        assert np.array_equal(made.root[: len(old)], old.root)
-        assert np.array_equal(made.rotations[: len(old)], old.rotations)
-        steps = np.linalg.norm(np.diff(made.positions(), axis=0), axis=-1).max(axis=1)
+    for person, old in zip(duet, past, strict=True):
+        assert len(person) == len(old) + round(0.5 * old.fps)
+        assert person.skeleton == old.skeleton
+        assert np.array_equal(person.root[: len(old)], old.root)
+        assert np.array_equal(person.rotations[: len(old)], old.rotations)
+        steps = np.linalg.norm(np.diff(person.positions(), axis=0), axis=-1).max(axis=1)
         assert steps[len(old) - 1] < 1.5 * steps[len(old) - 4 : len(old) - 1].max() + 0.02
 
 
@@ -249,18 +249,18 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
     count = round(1.2 * whole[0].fps)
     past = tuple(motion.frames(0, count) for motion in whole)
 
-    def true(prior, net, said, frames, **_):
+    def true(prior, net, prompts, frames, **_):
         legs = PairPast.of(whole).legs
-        seen = PairPast.of((past[0], past[1])).known.features.shape[1]
-        at = count - 1 + (np.arange(frames + 1) - (seen - 1)) / 20 * whole[0].fps
+        frames_seen = PairPast.of((past[0], past[1])).known.features.shape[1]
+        at = count - 1 + (np.arange(frames + 1) - (frames_seen - 1)) / 20 * whole[0].fps
         uniform = one_world([to_smpl22(motion).positions() for motion in whole], legs)
         encoded = two.encode(np.stack([positions_at(person, at) for person in uniform]))
         return PairMotion.stack([encoded])
 
     monkeypatch.setattr(pair, "pair_features", true)
     [duet] = complete_pair(prior, block, (past[0], past[1]), seconds=0.5)
-    for made, old in zip(duet, whole, strict=True):
-        apart = np.linalg.norm(made.positions() - old.positions()[: len(made)], axis=-1)
+    for whole_person, old in zip(duet, whole, strict=True):
+        apart = np.linalg.norm(whole_person.positions() - old.positions()[: len(whole_person)], axis=-1)
         assert apart[count:].mean() < 0.012, apart[count:].mean(axis=1)
 
 
@@ -268,14 +268,14 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nine pairs, of which eight are denoised at once; the last but one row is changed."""
-    asked: list[dict] = []
-    shown: list[np.ndarray] = []
+    calls: list[dict] = []
+    states: list[np.ndarray] = []
 
     def guidance(prior: Prior, net: PairSession, bound: object, **how):
-        asked.append(how)
+        calls.append(how)
 
         def lead(state: np.ndarray, guess: np.ndarray, level: int) -> np.ndarray:
-            shown.append(guess)
+            states.append(guess)
             return guess
 
         return lead
@@ -287,20 +287,20 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
     observed = Observed(np.zeros(known.shape, np.float32), known, noise_free=True)
     how = {"seeds": list(range(18)), "steps": 1, "pair_guidance": 0.5}
     for frozen, expected in ((None, [True, False]), ([False] * 17 + [True], [False, True])):
-        shown.clear()
-        asked.clear()
-        pair_features(prior, block.net(prior), SAID * 9, FRAMES, edits=PairEdits(observed, change, frozen), **how)
-        first, second = asked
+        states.clear()
+        calls.clear()
+        pair_features(prior, block.net(prior), PROMPTS * 9, FRAMES, edits=PairEdits(observed, change, frozen), **how)
+        first, second = calls
         assert (first["frozen"], second["frozen"]) == ([False] * 16, expected)
         assert (first["seeds"], second["seeds"]) == (list(range(16)), [16, 17])
         assert (first["weight"], second["weight"]) == (0.5, 0.5)
         assert (int(first["mask"].sum()), int(second["mask"].sum())) == (0, 4 * 263)
-        assert [(one[:, 1:] == 7.0).all((1, 2)).tolist() for one in shown] == [[False] * 16, [True, False]]
+        assert [(one[:, 1:] == 7.0).all((1, 2)).tolist() for one in states] == [[False] * 16, [True, False]]
     with pytest.raises(MotionloomError):
-        pair_features(prior, block.net(prior), SAID * 9, FRAMES, edits=PairEdits(frozen=[False]), **how)
+        pair_features(prior, block.net(prior), PROMPTS * 9, FRAMES, edits=PairEdits(frozen=[False]), **how)
     monkeypatch.undo()
     with pytest.raises(MotionloomError, match="pair_guidance must be 0 to 1"):
-        pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"pair_guidance": 1.5})
+        pair_features(prior, block.net(prior), PROMPTS * 9, FRAMES, **how | {"pair_guidance": 1.5})
 
 
 def test_who_goes_on_is_led_to_the_other(prior: Prior, block: PairBlock) -> None:
@@ -353,9 +353,9 @@ def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) 
         ({"guidance": float("nan")}, "guidance"),
         ({"goals": (Goal.nothing(3), None)}, "goal of 3"),
     ]
-    for given, message in wrong:
+    for options, message in wrong:
         with pytest.raises(MotionloomError, match=message):
-            generate_pair(prior, block, "a person walks", **given)
+            generate_pair(prior, block, "a person walks", **options)
     for prompt in ("", "  ", ("a person walks", "")):
         with pytest.raises(MotionloomError, match="prompt is empty"):
             generate_pair(prior, block, prompt)

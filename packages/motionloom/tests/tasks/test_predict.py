@@ -60,11 +60,11 @@ BODIES = {"person": lambda s, fps=30.0: person(s, fps), "rig": on_rig, "hips": o
 def test_the_past_comes_back_bit_for_bit_and_goes_on_without_a_seam(body: str, fps: float) -> None:
     past = BODIES[body](1.2, fps)
     n = len(past)
-    asked = FEW | {"seconds": 1.0, "temperature": 1.0}  # random weights throw people about as much as the noise is
-    (made,) = predict(PREDICTOR, past, **asked)
-    assert len(made) == n + round(fps)
-    assert same(made.frames(0, n), past)
-    places = joints22(made)
+    options = FEW | {"seconds": 1.0, "temperature": 1.0}  # random weights throw people about as much as the noise is
+    (motion,) = predict(PREDICTOR, past, **options)
+    assert len(motion) == n + round(fps)
+    assert same(motion.frames(0, n), past)
+    places = joints22(motion)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=-1).max(-1)
     assert speed[n - 1 : n + 3].max() < 1.2 * speed[: n - 1].max()
     bend = np.linalg.norm(np.diff(places, 2, axis=0), axis=-1).max(-1)
@@ -74,16 +74,16 @@ def test_the_past_comes_back_bit_for_bit_and_goes_on_without_a_seam(body: str, f
 @pytest.mark.parametrize("body", sorted(BODIES))
 def test_bones_of_the_future_are_exactly_those_of_the_past(body: str) -> None:
     past = BODIES[body](1.0)
-    (made,) = predict(PREDICTOR, past, **FEW)
+    (motion,) = predict(PREDICTOR, past, **FEW)
     if past.translations is None:
-        assert made.translations is None
+        assert motion.translations is None
         return
-    assert made.translations is not None
+    assert motion.translations is not None
     moving = [1]  # the hips, which carry the way
     rest = [j for j in range(1, len(past.skeleton)) if j not in moving]
-    last = np.repeat(past.translations[-1:], len(made) - len(past), axis=0)
-    assert np.array_equal(made.translations[len(past) :, rest], last[:, rest])
-    assert np.array_equal(made.root[len(past) :], np.repeat(past.root[-1:], len(last), axis=0))
+    last = np.repeat(past.translations[-1:], len(motion) - len(past), axis=0)
+    assert np.array_equal(motion.translations[len(past) :, rest], last[:, rest])
+    assert np.array_equal(motion.root[len(past) :], np.repeat(past.root[-1:], len(last), axis=0))
 
 
 FILES = {
@@ -97,9 +97,9 @@ FILES = {
 def test_real_clips_of_three_families_go_on(name: str) -> None:
     path, options = FILES[name]
     past = load(shared(f"data/{path}"), **options).frames(0, 30)
-    (made,) = predict(PREDICTOR, past, **FEW)
-    assert same(made.frames(0, 30), past)
-    places = joints22(made)
+    (motion,) = predict(PREDICTOR, past, **FEW)
+    assert same(motion.frames(0, 30), past)
+    places = joints22(motion)
     bend = np.linalg.norm(np.diff(places, 2, axis=0), axis=-1).max(-1)
     assert bend[28:30].max() < 2.3 * max(bend[:28].max(), 0.02)
 
@@ -118,8 +118,8 @@ def test_head_and_toes_stay_as_they_are_held() -> None:
     turns = past.rotations.copy()
     bent = rot.rotvec_to_quat(np.array([0.6, 0.3, -0.8]))
     turns[:, [15, 10]] = bent
-    (made,) = predict(PREDICTOR, replace(past, rotations=turns), **FEW)
-    off = rot.quat_to_rotvec(rot.multiply(made.rotations[30:, [15, 10]], rot.inverse(bent)))
+    (motion,) = predict(PREDICTOR, replace(past, rotations=turns), **FEW)
+    off = rot.quat_to_rotvec(rot.multiply(motion.rotations[30:, [15, 10]], rot.inverse(bent)))
     assert np.degrees(np.linalg.norm(off, axis=-1)).max() < 25
 
 
@@ -127,28 +127,28 @@ def test_a_person_takes_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At the predictor's own rate a frame of the grid is a frame of the result."""
-    given, apply = [], task.continue_motion
+    calls, apply = [], task.continue_motion
 
-    def continued(tail, places, **asked):
-        given.append((places, len(tail)))
-        return apply(tail, places, **asked)
+    def continued(tail, places, **options):
+        calls.append((places, len(tail)))
+        return apply(tail, places, **options)
 
     monkeypatch.setattr(task, "continue_motion", continued)
     predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
-    ((places, known),) = given
-    seen = Past.of(PREDICTOR, PAST).person
-    assert known == len(seen)
-    drawn = next(
-        WindowSampler(PREDICTOR, PredictionSampling(steps=1, temperature=1.0)).windows(seen[None], [(0, 0)], None, 1)
+    ((places, known),) = calls
+    person = Past.of(PREDICTOR, PAST).person
+    assert known == len(person)
+    window = next(
+        WindowSampler(PREDICTOR, PredictionSampling(steps=1, temperature=1.0)).windows(person[None], [(0, 0)], None, 1)
     )[0]
-    np.testing.assert_allclose(places, np.concatenate([seen, drawn]), atol=1e-5)
+    np.testing.assert_allclose(places, np.concatenate([person, window]), atol=1e-5)
 
 
 def test_frames_that_are_a_rounding_more_than_a_window_are_made_too() -> None:
     """A second is a window; 60 frames of 59.94 fps are a little more than that."""
     past = person(1.0, 59.94)
-    made = predict(PREDICTOR, past, **FEW | {"seconds": 1.0})[0]
-    assert len(made) == len(past) + 60
+    motion = predict(PREDICTOR, past, **FEW | {"seconds": 1.0})[0]
+    assert len(motion) == len(past) + 60
     assert len(predict(PREDICTOR, past, **FEW | {"seconds": 1 / 59.94})[0]) == len(past) + 1
 
 
@@ -156,21 +156,21 @@ def test_frames_that_are_a_rounding_more_than_a_window_are_made_too() -> None:
 
 
 def test_future_i_is_the_same_alone_among_others_and_in_pieces() -> None:
-    asked = {"seconds": 1.3, "seed": 5, "steps": 2}
-    many = predict(PREDICTOR, PAST, count=3, **asked)
-    few = predict(PREDICTOR, PAST, count=2, **asked)
-    pieces = list(predict_pieces(PREDICTOR, PAST, number=2, **asked))
+    options = {"seconds": 1.3, "seed": 5, "steps": 2}
+    many = predict(PREDICTOR, PAST, count=3, **options)
+    few = predict(PREDICTOR, PAST, count=2, **options)
+    pieces = list(predict_pieces(PREDICTOR, PAST, number=2, **options))
     assert same(pieces[0], PAST)
     close(concatenate(*pieces), many[2])
     for i in (0, 1):
         close(few[i], many[i])
-    (last,) = predict(PREDICTOR, PAST, count=1, first=2, **asked)
+    (last,) = predict(PREDICTOR, PAST, count=1, first=2, **options)
     close(last, many[2])
-    again = predict(PREDICTOR, PAST, count=2, **asked)
+    again = predict(PREDICTOR, PAST, count=2, **options)
     assert all(same(a, b) for a, b in zip(few, again, strict=True))
     apart = [np.abs(many[i].positions() - many[j].positions()).max() for i in range(3) for j in range(i)]
     assert min(apart) > 0.01
-    other = predict(PREDICTOR, PAST, count=1, **asked | {"seed": 6})[0]
+    other = predict(PREDICTOR, PAST, count=1, **options | {"seed": 6})[0]
     assert np.abs(other.positions() - many[0].positions()).max() > 0.01
 
 
@@ -190,14 +190,14 @@ def test_a_long_future_comes_in_pieces_without_seams_between_them(monkeypatch: p
 
 def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing that is kept grows with what was made: neither places nor poses."""
-    kept: list[int] = []
+    lengths: list[int] = []
 
     def apply_positions(places, old, **_):
-        kept.append(len(old))
+        lengths.append(len(old))
         return old
 
     def positions_at(grid, at):
-        kept.append(len(grid))
+        lengths.append(len(grid))
         assert at[0] >= -1e-6
         assert at[-1] <= len(grid) - 1 + 1e-6
         return grid[at.round().astype(int)]
@@ -206,32 +206,32 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(task, "positions_at", positions_at)
     total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=60, steps=1, foot_lock=False))
     assert total == 30 + 1800
-    assert max(kept) <= 15 + 30 * (task.CHUNK + 1) + 2 * 15
+    assert max(lengths) <= 15 + 30 * (task.CHUNK + 1) + 2 * 15
 
 
 def test_without_a_temperature_every_seed_makes_the_same() -> None:
-    asked = {"seconds": 0.5, "steps": 2, "temperature": 0.0}
-    first, second = predict(PREDICTOR, PAST, count=2, **asked)
+    options = {"seconds": 0.5, "steps": 2, "temperature": 0.0}
+    first, second = predict(PREDICTOR, PAST, count=2, **options)
     close(first, second)
-    close(concatenate(*predict_pieces(PREDICTOR, PAST, seed=7, **asked)), first)
-    one, other = switch(PREDICTOR, PAST, PAST, count=2, **asked | {"seconds": 1.2})
+    close(concatenate(*predict_pieces(PREDICTOR, PAST, seed=7, **options)), first)
+    one, other = switch(PREDICTOR, PAST, PAST, count=2, **options | {"seconds": 1.2})
     close(one, other)
 
 
 def test_progress_is_reported_window_by_window() -> None:
-    told: list[tuple[int, int]] = []
-    predict(PREDICTOR, PAST, count=1, seconds=2.5, steps=1, progress=lambda done, of: told.append((done, of)))
-    assert told == [(1, 3), (2, 3), (3, 3)]
+    reports: list[tuple[int, int]] = []
+    predict(PREDICTOR, PAST, count=1, seconds=2.5, steps=1, progress=lambda windows, of: reports.append((windows, of)))
+    assert reports == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_without_its_way_a_person_comes_to_a_stop_and_stays_in_place() -> None:
-    made = predict(PREDICTOR, PAST, **FEW | {"seconds": 2.0}, root=False)[0]
-    level = made.root[:, [0, 2]]
+    motion = predict(PREDICTOR, PAST, **FEW | {"seconds": 2.0}, root=False)[0]
+    level = motion.root[:, [0, 2]]
     assert np.linalg.norm(level[-1] - level[45]) < 0.05
     assert np.linalg.norm(level[-1] - level[29]) < 0.25
-    close(concatenate(*predict_pieces(PREDICTOR, PAST, seconds=2.0, steps=2, root=False)), made)
+    close(concatenate(*predict_pieces(PREDICTOR, PAST, seconds=2.0, steps=2, root=False)), motion)
     free = predict(PREDICTOR, PAST, **FEW | {"seconds": 2.0})[0]
-    assert np.linalg.norm((free.root - made.root)[-1]) > 0.02
+    assert np.linalg.norm((free.root - motion.root)[-1]) > 0.02
 
 
 # Switch
@@ -240,18 +240,18 @@ def test_without_its_way_a_person_comes_to_a_stop_and_stays_in_place() -> None:
 @pytest.mark.parametrize(("body", "facing"), [("person", "turned"), ("rig", "kept"), ("hips", "turned")])
 def test_a_target_comes_back_bit_for_bit_but_for_a_rigid_move_on_the_ground(body: str, facing: str) -> None:
     past, target = BODIES[body](1.0), BODIES[body](6.0).frames(140, 170)
-    (made,) = switch(PREDICTOR, past, target, seconds=0.5, steps=2, facing=facing)
-    assert len(made) == 30 + 15 + 30
-    assert same(made.frames(0, 30), past)
-    tail, mover = made.frames(45, 75), 0 if past.translations is None else 1
+    (motion,) = switch(PREDICTOR, past, target, seconds=0.5, steps=2, facing=facing)
+    assert len(motion) == 30 + 15 + 30
+    assert same(motion.frames(0, 30), past)
+    tail, mover = motion.frames(45, 75), 0 if past.translations is None else 1
     joints = [j for j in range(len(past.skeleton)) if j != mover]
     assert np.array_equal(tail.rotations[:, joints], target.rotations[:, joints])
     here, there = joints22(tail), joints22(target)
     np.testing.assert_allclose(here[..., 1], there[..., 1], atol=1e-9)
     turn = ground_pose_at(tail, 0).facing - ground_pose_at(target, 0).facing
     np.testing.assert_allclose(here - here[:1, :1], turned(there - there[:1, :1], turn), atol=1e-9)
-    wanted = ground_pose_at(past, 29) if facing == "turned" else ground_pose_at(target, 0)
-    assert ground_pose_at(tail, 0).apart(wanted)[1] < (0.35 if facing == "turned" else 1e-9)
+    pose = ground_pose_at(past, 29) if facing == "turned" else ground_pose_at(target, 0)
+    assert ground_pose_at(tail, 0).apart(pose)[1] < (0.35 if facing == "turned" else 1e-9)
 
 
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 24.0), (0.1, 120.0), (0.5, 30.0), (1.0, 24.0), (2.6, 30.0)])
@@ -259,25 +259,25 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
     """Gaps shorter and longer than what one window sees."""
     past, target = person(1.0, fps), person(3.0, fps).frames(round(2.2 * fps), round(3 * fps))
     gap = round(seconds * fps)
-    (made,) = switch(PREDICTOR, past, target, seconds=seconds, steps=2)
-    assert len(made) == len(past) + gap + len(target)
-    speed = np.linalg.norm(np.diff(joints22(made), axis=0), axis=-1).max(-1) * fps
+    (motion,) = switch(PREDICTOR, past, target, seconds=seconds, steps=2)
+    assert len(motion) == len(past) + gap + len(target)
+    speed = np.linalg.norm(np.diff(joints22(motion), axis=0), axis=-1).max(-1) * fps
     usual = max(speed[: len(past) - 1].max(), speed[len(past) + gap :].max())
     near = [len(past) - 1, len(past), len(past) + gap - 2, len(past) + gap - 1]
     assert speed[near].max() < (2.0 if seconds >= 0.5 else 5.0) * usual
 
 
 def test_the_network_sees_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
-    told, draw = [], WindowSampler.window
+    knowns, draw = [], WindowSampler.window
 
-    def window(self, person, seeds, number, known, **asked):
-        told.append(known)
-        return draw(self, person, seeds, number, known, **asked)
+    def window(self, person, seeds, number, known, **options):
+        knowns.append(known)
+        return draw(self, person, seeds, number, known, **options)
 
     monkeypatch.setattr(WindowSampler, "window", window)
     target = person(3.0, 30.0).frames(60, 90)
     switch(PREDICTOR, PAST, target, seconds=0.5, steps=1, facing="kept")
-    (known,) = told
+    (known,) = knowns
     assert np.array_equal(known.mask[:, 1] == 1, np.arange(1, len(known.mask) + 1) >= 16)
     assert not known.mask[:, 0].any(), "where it arrives is free"
     places, real = known.positions[15:], joints22(target)[: len(known.positions) - 15]
@@ -297,15 +297,15 @@ def test_many_switches_differ_and_each_has_its_own_seed() -> None:
     )
     close(free, beyond)  # longer than what is drawn in sight of the target
     assert np.abs(many[0].positions() - many[1].positions()).max() > 0.005
-    assert all(len(made) == 30 + 18 + 10 for made in many)
+    assert all(len(motion) == 30 + 18 + 10 for motion in many)
 
 
 @pytest.mark.parametrize("fps", [10.0, 30.0, 120.0])
 def test_two_frames_are_target_enough(fps: float) -> None:
     past, target = person(1.0, fps), person(3.0, fps).frames(round(2 * fps), round(2 * fps) + 2)
-    (made,) = switch(PREDICTOR, past, target, seconds=0.4, steps=2)
-    assert np.array_equal(made.rotations[-2:, 1:], target.rotations[:, 1:])
-    speed = np.linalg.norm(np.diff(joints22(made), axis=0), axis=-1).max(-1)
+    (motion,) = switch(PREDICTOR, past, target, seconds=0.4, steps=2)
+    assert np.array_equal(motion.rotations[-2:, 1:], target.rotations[:, 1:])
+    speed = np.linalg.norm(np.diff(joints22(motion), axis=0), axis=-1).max(-1)
     assert speed[-3:].max() < 2.0 * speed[: len(past) - 1].max()
 
 
@@ -337,10 +337,10 @@ MISTAKES = {
 
 @pytest.mark.parametrize("name", sorted(MISTAKES))
 def test_what_cannot_be_predicted_is_reported_in_one_sentence(name: str) -> None:
-    asked = {"predictor": PREDICTOR, "past": PAST, "count": 1, "seconds": 0.5} | MISTAKES[name]
-    predictor, past = asked.pop("predictor"), asked.pop("past")
+    options = {"predictor": PREDICTOR, "past": PAST, "count": 1, "seconds": 0.5} | MISTAKES[name]
+    predictor, past = options.pop("predictor"), options.pop("past")
     with pytest.raises(MotionloomError) as error:
-        predict(predictor, past, **asked)
+        predict(predictor, past, **options)
     assert "\n" not in str(error.value)
     assert not str(error.value).endswith(".")
 
@@ -362,12 +362,12 @@ TARGETS = {
 
 @pytest.mark.parametrize("word", sorted(TARGETS))
 def test_a_target_that_cannot_be_arrived_at_is_reported(word: str) -> None:
-    target, asked = TARGETS[word]
+    target, options = TARGETS[word]
     with pytest.raises(MotionloomError, match=word):
-        switch(PREDICTOR, PAST, target, **asked)
+        switch(PREDICTOR, PAST, target, **options)
 
 
 def test_a_window_that_sees_a_second_is_enough_to_arrive() -> None:
     """Whatever the window, a switch's target is within sight of its last window."""
-    (made,) = switch(replace(PREDICTOR, fps=60.0), PAST, PAST, seconds=1.4, steps=1)
-    assert len(made) == 30 + 42 + 30
+    (motion,) = switch(replace(PREDICTOR, fps=60.0), PAST, PAST, seconds=1.4, steps=1)
+    assert len(motion) == 30 + 42 + 30

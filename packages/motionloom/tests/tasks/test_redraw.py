@@ -38,13 +38,13 @@ def timed(prior: Prior, segments, path: Goal | None = None, **settings: Any) -> 
     return Timed(prior, list(segments), path, Sampling(**{"steps": STEPS, **settings}))
 
 
-def drawn(asked: Timed) -> Motion:
-    return concatenate(*compose(asked.prior, asked.segments, path=asked.path, sampling=asked.sampling))
+def sampled(timeline: Timed) -> Motion:
+    return concatenate(*compose(timeline.prior, timeline.segments, path=timeline.path, sampling=timeline.sampling))
 
 
 def changed(before: Timed, after: Timed, old: Motion | None = None) -> tuple[Motion, Motion, list[int]]:
     """The motion before, the one after, and how many rows were moved at a time."""
-    old, moves = old or drawn(before), []
+    old, moves = old or sampled(before), []
     runs = changed_runs(before.blocks, after)
     assert runs is not None
     return old, resample_runs(after, old, before.blocks, runs, moves.append), moves
@@ -83,8 +83,8 @@ def test_the_motion_goes_through_both_borders_without_a_jump(prior: Prior) -> No
 
 def test_feet_stand_still_across_both_borders() -> None:
     """With the shipped weights: planted feet slide less than 3 mm a frame, on average over three changes of words."""
-    real, stands = Prior.load(), "a person stands still"
-    segments = [Segment(text, 2.0) for text in (stands, "a person waves with the right hand", stands)]
+    real, words = Prior.load(), "a person stands still"
+    segments = [Segment(text, 2.0) for text in (words, "a person waves with the right hand", words)]
     slides = []
     for text in ("a person claps", "a person bows", "a person raises both arms"):
         other = [segments[0], replace(segments[1], text=text), segments[2]]
@@ -185,21 +185,21 @@ def test_on_a_path_what_lies_behind_stays_in_its_place(prior: Prior) -> None:
 
 
 def test_what_is_sampled_is_seen_at_its_time(prior: Prior) -> None:
-    before, after, seen = timed(prior, SEGMENTS), timed(prior, with_words(2, "a person kicks")), list[Denoised]()
-    old = drawn(before)
-    with watching(seen.append):
+    before, after, reports = timed(prior, SEGMENTS), timed(prior, with_words(2, "a person kicks")), list[Denoised]()
+    old = sampled(before)
+    with watching(reports.append):
         new = changed(before, after, old)[1]
-    assert [one.done for one in seen] == [1, 2, 3]
-    assert {one.begin for one in seen} == {3.5}
-    last = seen[-1].positions()[0, 0]
+    assert [one.move for one in reports] == [1, 2, 3]
+    assert {one.begin for one in reports} == {3.5}
+    last = reports[-1].positions()[0, 0]
     assert len(last) == 60
     assert np.abs(last - new.positions()[70:130]).mean() < 0.1
 
 
 def test_blocks_come_back_from_a_file_if_they_fit_the_motion(prior: Prior) -> None:
     blocks = timed(prior, SEGMENTS).blocks
-    kept = [list(block) for block in blocks]
-    assert blocks_from(kept, 200) == blocks
+    values = [list(block) for block in blocks]
+    assert blocks_from(values, 200) == blocks
     for wrong in (
         None,
         [],
@@ -212,5 +212,5 @@ def test_blocks_come_back_from_a_file_if_they_fit_the_motion(prior: Prior) -> No
         [["a", 300, 9], ["b", -100, 9]],
     ):
         assert blocks_from(wrong, 200) == []
-    assert blocks_from(kept, 199) == []
+    assert blocks_from(values, 199) == []
     assert isinstance(blocks[0], Block)

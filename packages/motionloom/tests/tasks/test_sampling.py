@@ -11,7 +11,7 @@ from tests.recorded import tiny
 
 
 @pytest.mark.parametrize(
-    ("kind", "settings", "said"),
+    ("kind", "settings", "sentence"),
     [
         (Sampling, {"steps": 0}, "steps must be a whole number from 1 to 100,000; got 0"),
         (Sampling, {"steps": 2.5}, "steps must be a whole number .*; got 2.5"),
@@ -27,10 +27,10 @@ from tests.recorded import tiny
         (PairSampling, {"pair_guidance": 1.5}, "pair_guidance must be 0 to 1; got 1.5"),
     ],
 )
-def test_a_value_checks_itself(kind: type[Sampling], settings: dict, said: str) -> None:
-    with pytest.raises(MotionloomError, match=said):
+def test_a_value_checks_itself(kind: type[Sampling], settings: dict, sentence: str) -> None:
+    with pytest.raises(MotionloomError, match=sentence):
         kind(**settings)
-    with pytest.raises(MotionloomError, match=said):
+    with pytest.raises(MotionloomError, match=sentence):
         kind.of(None, settings)
 
 
@@ -40,10 +40,10 @@ def test_single_settings_change_a_value() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "meant"), [("step", "'steps'"), ("guidence", "'guidance'"), ("xyz", "the settings are")]
+    ("name", "hint"), [("step", "'steps'"), ("guidence", "'guidance'"), ("xyz", "the settings are")]
 )
-def test_a_setting_that_there_is_not_is_said(name: str, meant: str) -> None:
-    with pytest.raises(TypeError, match=f"no setting '{name}'.*{meant}"):
+def test_a_setting_that_there_is_not_is_said(name: str, hint: str) -> None:
+    with pytest.raises(TypeError, match=f"no setting '{name}'.*{hint}"):
         Sampling.of(None, {name: 1})
 
 
@@ -74,11 +74,11 @@ def test_settled_states_are_smoothed_hold_what_is_observed_and_are_edited_once_m
 
     mask = np.zeros((1, 12, len(prior.mean)), np.bool_)
     mask[:, :3] = True
-    given = Observed(np.full(mask.shape, 0.5, np.float32), mask)
+    observed = Observed(np.full(mask.shape, 0.5, np.float32), mask)
     rows, how = Rows(["a person walks"], [12], [3], slots=slots), Sampling(steps=3)
-    [(_, plain)] = sample(prior, rows, how, observed=given)
-    [(_, made)] = sample(prior, rows, how, observed=given, edits=[edit], corrected=True)
+    [(_, plain)] = sample(prior, rows, how, observed=observed)
+    [(_, settled)] = sample(prior, rows, how, observed=observed, edits=[edit], corrected=True)
     smoothed = np.concatenate([plain[:slots], prior.smoothed(plain[slots:])])
-    np.testing.assert_allclose(made, np.where(mask[0], 0.5, smoothed) + 1, atol=1e-5)
+    np.testing.assert_allclose(settled, np.where(mask[0], 0.5, smoothed) + 1, atol=1e-5)
     assert np.abs(smoothed - plain).max() > 1e-3
     assert (levels[-1], all(levels[:-1]), len(levels)) == (0, True, 4)

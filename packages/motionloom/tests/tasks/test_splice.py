@@ -16,9 +16,9 @@ OLD = person(2.0, 30.0)
 @pytest.mark.parametrize(("first", "last"), [(20, 40), (20, 60), (0, 40), (59, 60), (30, 31)])
 def test_outside_of_a_stretch_and_in_kept_parts_nothing_changes(first: int, last: int) -> None:
     turn = rot.rotvec_to_quat(np.array([0.2, 0.1, -0.3]))
-    made = Motion(SMPL22, 30.0, OLD.root + np.array([0.3, 0.1, -0.2]), rot.multiply(OLD.rotations, turn))
+    new = Motion(SMPL22, 30.0, OLD.root + np.array([0.3, 0.1, -0.2]), rot.multiply(OLD.rotations, turn))
     joints, place = np.arange(22) % 3 == 1, np.array([True, False, True])
-    result = splice(OLD, made, first, last=last, kept=KeptParts(joints, place))
+    result = splice(OLD, new, first, last=last, keep=KeptParts(joints, place))
     inside = (np.arange(60) >= first) & (np.arange(60) < last)
     assert np.array_equal(result.rotations[~inside], OLD.rotations[~inside])
     assert np.array_equal(result.root[~inside], OLD.root[~inside])
@@ -34,8 +34,8 @@ def test_a_constant_difference_fades_from_the_border_and_is_gone_behind_it() -> 
     angle = 0.5
     turns = OLD.rotations.copy()
     turns[:, 15] = rot.multiply(turns[:, 15], rot.rotvec_to_quat(np.array([0, angle, 0])))
-    made = Motion(SMPL22, 30.0, OLD.root, turns)
-    result = splice(OLD, made, 20, last=60, kept=KeptParts(np.zeros(22, dtype=bool), np.zeros(3, dtype=bool)))
+    new = Motion(SMPL22, 30.0, OLD.root, turns)
+    result = splice(OLD, new, 20, last=60, keep=KeptParts(np.zeros(22, dtype=bool), np.zeros(3, dtype=bool)))
     apart = rot.multiply(rot.inverse(OLD.rotations[20:, 15]), result.rotations[20:, 15])
     away = np.linalg.norm(rot.quat_to_rotvec(apart), axis=-1)
     ease = 9

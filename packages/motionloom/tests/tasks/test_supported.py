@@ -34,14 +34,14 @@ def climbing(*heights: float, seconds: float = 1.0) -> Motion:
 
 @pytest.mark.parametrize("heights", [(0, 0.2, 0.33, 0.55, 0.66), (0, 0.4, 0.9, 1.3), (0.7, 0.5, 0.36, 0.19, 0)])
 def test_feet_come_onto_steps_of_one_height_one_after_the_other(heights: tuple[float, ...]) -> None:
-    made = add_support(climbing(*heights))
-    found = stairs(made.positions(), FPS)
-    assert found is not None
-    assert 0.14 < found.rise < 0.21
-    assert np.abs(np.diff(found.levels)).max() <= 1
-    off = [abs(hold.height - level * found.rise) for hold, level in zip(found.holds, found.levels, strict=True)]
+    motion = add_support(climbing(*heights))
+    flight = stairs(motion.positions(), FPS)
+    assert flight is not None
+    assert 0.14 < flight.rise < 0.21
+    assert np.abs(np.diff(flight.levels)).max() <= 1
+    off = [abs(hold.height - level * flight.rise) for hold, level in zip(flight.holds, flight.levels, strict=True)]
     assert max(off) < 0.03
-    assert len(heights) - 2 <= found.steps < len(heights)  # two that are nearly as high are one
+    assert len(heights) - 2 <= flight.steps < len(heights)  # two that are nearly as high are one
 
 
 def test_who_hovers_comes_down_and_who_stands_or_sits_high_stays() -> None:

@@ -45,11 +45,11 @@ def test_a_row_is_the_same_in_any_company(prior: Prior) -> None:
 
 def test_motion_i_is_drawn_from_seed_plus_i(prior: Prior) -> None:
     """Two of each prompt from seed 5: the fourth is what seed 8 alone makes of the second prompt."""
-    made = generate(prior, ["a person walks", "a person turns"], count=2, seed=5, foot_lock=False, **FEW)
+    motions = generate(prior, ["a person walks", "a person turns"], count=2, seed=5, foot_lock=False, **FEW)
     alone = generate(prior, "a person turns", seed=8, foot_lock=False, **FEW)[0]
-    assert len(made) == 4
-    np.testing.assert_allclose(made[3].positions(), alone.positions(), atol=1e-4)
-    assert np.abs(made[2].positions() - made[3].positions()).max() > 1e-3
+    assert len(motions) == 4
+    np.testing.assert_allclose(motions[3].positions(), alone.positions(), atol=1e-4)
+    assert np.abs(motions[2].positions() - motions[3].positions()).max() > 1e-3
 
 
 def test_seeds_and_prompts_matter_and_repetition_is_exact(prior: Prior) -> None:
@@ -65,20 +65,20 @@ def test_no_guidance_ignores_the_prompt(prior: Prior) -> None:
 
 
 def test_lengths_and_rate_are_what_was_asked(prior: Prior) -> None:
-    made = generate(prior, ["a person walks", "a person turns"], seconds=[0.5, 1.25], steps=2)
-    assert [len(m) for m in made] == [10, 25]
-    assert all(m.fps == 20 and isinstance(m, Motion) and len(m.skeleton) == 22 for m in made)
+    motions = generate(prior, ["a person walks", "a person turns"], seconds=[0.5, 1.25], steps=2)
+    assert [len(m) for m in motions] == [10, 25]
+    assert all(m.fps == 20 and isinstance(m, Motion) and len(m.skeleton) == 22 for m in motions)
     assert len(generate(prior, "a person walks", seconds=np.float64(0.6), steps=1)[0]) == 12
 
 
 def test_progress_counts_every_call(prior: Prior) -> None:
-    said: list[tuple[int, int]] = []
-    generate(prior, "a person walks", count=9, progress=lambda *pair: said.append(pair), seconds=0.3, steps=3)
-    assert said == [(i, 6) for i in range(1, 7)]
+    reports: list[tuple[int, int]] = []
+    generate(prior, "a person walks", count=9, progress=lambda *pair: reports.append(pair), seconds=0.3, steps=3)
+    assert reports == [(i, 6) for i in range(1, 7)]
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "options",
     [
         {"prompts": ""},
         {"prompts": ["a person walks", " \t"]},
@@ -104,17 +104,17 @@ def test_progress_counts_every_call(prior: Prior) -> None:
     ],
     ids=str,
 )
-def test_what_cannot_be_asked_is_refused(prior: Prior, asked: dict) -> None:
+def test_what_cannot_be_asked_is_refused(prior: Prior, options: dict) -> None:
     with pytest.raises(MotionloomError) as caught:
-        generate(prior, **{"prompts": "a person walks", **asked})
+        generate(prior, **{"prompts": "a person walks", **options})
     assert "\n" not in str(caught.value)
 
 
 def babel_prior(folder: Path, *, flags: bool) -> Prior:
     """A prior of the published BABEL form, saved and read back, with a text encoder that is there."""
     mean, text = np.zeros(135, np.float32), PublishedText("clip-77")
-    made = replace(tiny.prior(replace(BABEL, flags=flags)), mean=mean, std=mean + 1, text=text, fps=30.0)
-    again = load_prior(save_prior(made, folder / "babel.safetensors", half=False))
+    prior = replace(tiny.prior(replace(BABEL, flags=flags)), mean=mean, std=mean + 1, text=text, fps=30.0)
+    again = load_prior(save_prior(prior, folder / "babel.safetensors", half=False))
     assert again.text.name == "clip-77"
     return replace(again, text=Words())
 
@@ -125,9 +125,9 @@ class Words:
     name, width = "words", 512
 
     def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
-        said = [texts] if isinstance(texts, str) else list(texts)
-        pooled = np.stack([normal((512,), len(t)) for t in said])
-        return TextEmbedding(pooled[:, None], np.ones((len(said), 1), dtype=np.bool_), pooled)
+        words = [texts] if isinstance(texts, str) else list(texts)
+        pooled = np.stack([normal((512,), len(t)) for t in words])
+        return TextEmbedding(pooled[:, None], np.ones((len(words), 1), dtype=np.bool_), pooled)
 
 
 @pytest.mark.parametrize("flags", [False, True], ids=["plain", "transitions"])
@@ -135,26 +135,26 @@ def test_babel_weights_make_motions(tmp_path: Path, flags: bool) -> None:
     """Saved and read: 30 fps, the asked lengths, from over the origin, facing +Z, as the seed says."""
     prior = babel_prior(tmp_path, flags=flags)
     assert prior.net.config.flags is flags
-    made = generate(prior, ["walk", "turn left"], seconds=[0.5, 1.0], steps=3)
-    assert [(len(m), m.fps, len(m.skeleton)) for m in made] == [(15, 30, 22), (30, 30, 22)]
+    motions = generate(prior, ["walk", "turn left"], seconds=[0.5, 1.0], steps=3)
+    assert [(len(m), m.fps, len(m.skeleton)) for m in motions] == [(15, 30, 22), (30, 30, 22)]
     raw = generate(prior, "turn left", seconds=1.0, steps=3, seed=1, foot_lock=False)[0]
     np.testing.assert_allclose(raw.root[0, [0, 2]], 0, atol=1e-9)
     np.testing.assert_allclose(facing(raw), [0, 0, 1], atol=1e-6)
     arms = [16, 17, 18, 19]
-    np.testing.assert_allclose(made[1].rotations[:, arms], raw.rotations[:, arms], atol=1e-5)
+    np.testing.assert_allclose(motions[1].rotations[:, arms], raw.rotations[:, arms], atol=1e-5)
 
 
 def test_babel_features_are_finished_as_its_codec_decodes_them(tmp_path: Path) -> None:
     """What is drawn is not smoothed (one frame per token), and becomes the codec's poses turned to +Z."""
     prior = babel_prior(tmp_path, flags=False)
-    drawn = sample_features(prior, ["walk"], [20], seeds=[3], steps=2)[0]
-    assert drawn.shape == (20, 135)
-    whole = finish(prior, drawn, foot_lock=False)
-    limbs = decode(drawn.astype(np.float64)).positions()
+    features = sample_features(prior, ["walk"], [20], seeds=[3], steps=2)[0]
+    assert features.shape == (20, 135)
+    whole = finish(prior, features, foot_lock=False)
+    limbs = decode(features.astype(np.float64)).positions()
     bent = np.linalg.norm(limbs - limbs[:, :1], axis=-1)
     places = whole.positions()
     np.testing.assert_allclose(np.linalg.norm(places - places[:, :1], axis=-1), bent, atol=1e-6)
-    np.testing.assert_allclose(whole.root[:, 1], drawn[:, 0], atol=1e-6)
+    np.testing.assert_allclose(whole.root[:, 1], features[:, 0], atol=1e-6)
 
 
 def test_cleaning_holds_a_babel_foot_that_slides() -> None:
@@ -172,8 +172,8 @@ def test_a_walk_of_263_numbers_is_put_on_the_floor() -> None:
     """The choice by width leaves HumanML3D as `to_motion` makes it, but for what hangs in the air or is sunk."""
     prior = tiny.prior()
     features = sample_features(prior, ["a person walks"], [12], seeds=[0], steps=2)[0]
-    wanted = to_motion(features.astype(np.float64), 20.0)
-    np.testing.assert_array_equal(finish(prior, features).positions(), add_support(wanted).positions())
+    expected = to_motion(features.astype(np.float64), 20.0)
+    np.testing.assert_array_equal(finish(prior, features).positions(), add_support(expected).positions())
     raw = to_motion(features.astype(np.float64), 20.0, foot_lock=False)
     np.testing.assert_array_equal(finish(prior, features, foot_lock=False).positions(), raw.positions())
 

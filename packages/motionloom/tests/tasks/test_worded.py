@@ -21,22 +21,22 @@ def prior() -> Prior:
 
 def test_it_is_drawn_again_until_the_number_is_right(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first drawing that has it is kept; the strokes get shorter where there were too many; the seeds differ."""
-    counts, drawn = iter([4, 3, 2, 9]), []
+    counts, timelines = iter([4, 3, 2, 9]), []
 
-    def draw_one(_: Prior, asked, sampling: Sampling, __: bool) -> Motion:
-        drawn.append((asked.seconds, sampling.seed))
+    def draw_one(_: Prior, timeline, sampling: Sampling, __: bool) -> Motion:
+        timelines.append((timeline.seconds, sampling.seed))
         return generate(prior, "a person stands", seconds=1.0, steps=1)[0]
 
     monkeypatch.setattr(worded, "_sample_timeline", draw_one)
     monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
-    asked = worded.read(prior, "a person jumps twice")
-    (made,) = worded.generate_timelines(prior, [asked], seeds=[5])
-    assert [one.measured for one in made.amounts] == [2]
-    assert made.amounts[0].kept
-    assert not made.amounts[0].problem
-    assert len({seed for _, seed in drawn}) == 3
-    assert drawn[0][1] == 5
-    assert drawn[0][0] > drawn[1][0] > drawn[2][0]
+    spoken = worded.read(prior, "a person jumps twice")
+    (result,) = worded.generate_timelines(prior, [spoken], seeds=[5])
+    assert [one.measured for one in result.amounts] == [2]
+    assert result.amounts[0].kept
+    assert not result.amounts[0].problem
+    assert len({seed for _, seed in timelines}) == 3
+    assert timelines[0][1] == 5
+    assert timelines[0][0] > timelines[1][0] > timelines[2][0]
 
 
 def test_the_nearest_is_kept_and_told(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,17 +44,17 @@ def test_the_nearest_is_kept_and_told(prior: Prior, monkeypatch: pytest.MonkeyPa
     still = generate(prior, "a person stands", seconds=1.0, steps=1)[0]
     monkeypatch.setattr(worded, "_sample_timeline", lambda *_: still)
     monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
-    (made,) = worded.generate_timelines(prior, [worded.read(prior, "a person jumps three times")], seeds=[0])
-    assert made.amounts[0].measured == 4
-    assert made.amounts[0].problem == "3 jumps asked; 4 jumps drawn"
+    (result,) = worded.generate_timelines(prior, [worded.read(prior, "a person jumps three times")], seeds=[0])
+    assert result.amounts[0].measured == 4
+    assert result.amounts[0].problem == "3 jumps asked; 4 jumps drawn"
 
 
 def test_python_reads_numbers_and_can_leave_them(prior: Prior) -> None:
     few = Sampling(steps=2, seed=3)
     turn, plain = generate(prior, ["turn left 90 degrees", "a person walks"], sampling=few)
-    (said,) = worded.generate_worded(prior, "turn left 90 degrees", sampling=few)
-    assert np.array_equal(turn.rotations, said.motion.rotations)
-    assert [one.read for one in said.amounts] == ["a turn of 90 degrees to the left"]
+    (result,) = worded.generate_worded(prior, "turn left 90 degrees", sampling=few)
+    assert np.array_equal(turn.rotations, result.motion.rotations)
+    assert [one.read for one in result.amounts] == ["a turn of 90 degrees to the left"]
     assert turn.seconds == pytest.approx(2.5)
     assert plain.seconds == pytest.approx(5.0)
     (literal,) = generate(prior, "turn left 90 degrees", literal=True, sampling=few)
@@ -138,8 +138,8 @@ def test_another_solver_draws_one_action(prior: Prior) -> None:
         generate(prior, "a person does three squats", solver="ddim", steps=2)
 
 
-@pytest.mark.parametrize(("text", "told"), [("a person vacuums", True), ("a person sits and waits", False)])
-def test_who_ends_standing_still_is_told(prior: Prior, text: str, told: bool) -> None:
+@pytest.mark.parametrize(("text", "still"), [("a person vacuums", True), ("a person sits and waits", False)])
+def test_who_ends_standing_still_is_told(prior: Prior, text: str, still: bool) -> None:
     """Unless the words ask for it."""
     moving = generate(prior, "a person walks", seconds=2.0, steps=1)[0]
     held = replace(
@@ -149,7 +149,7 @@ def test_who_ends_standing_still_is_told(prior: Prior, text: str, told: bool) ->
     )
     one = worded.Worded(held, worded.read(prior, text), ())
     assert one.still_from == pytest.approx(2.0, abs=0.2)
-    assert bool(one.stillness(of=0.3)) == told
+    assert bool(one.stillness(of=0.3)) == still
     assert not one.stillness(of=0.8)
 
 

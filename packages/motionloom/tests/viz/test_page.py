@@ -236,7 +236,7 @@ def test_motions_that_are_made_together_become_one_page_on_the_character(
     character = load_character(Hero().write(tmp_path / "hero.glb"))
     hero = Target("hero.glb", character.skeleton, character=character)
     [files] = places_of([Path("page.html")], 2, hero)
-    assert hero.save_all([hero.put(standing(8))] * 2, files, ["first", "second"]) == [Path("page.html")]
+    assert hero.save_all([hero.retarget(standing(8))] * 2, files, ["first", "second"]) == [Path("page.html")]
     given = Reader(Path("page.html").read_text()).given
     assert [take["name"] for take in given["takes"]] == ["first", "second"]
     assert given["character"]

@@ -50,13 +50,13 @@ def batch(
     where: Where = Where(),
     force: bool = False,
 ) -> Iterator[Result]:
-    """Make a motion of every row, and give what became of each, in the job's order.
+    """Generate a motion of every row; yields what became of each, in the job's order.
 
     jobs: a file (JSON lines, CSV, Parquet), or mappings with the columns of docs/batch.md. out: the folder for the
-    motions; rows that are already in it are not made again, and processes beside this one do the work. Without
-    ``out`` this process makes the motions one after the other and keeps none: each `Result` has its motion. force: take
-    a folder that holds another job's motions, which then go. Raises `MotionloomError` for jobs, options and folders
-    that cannot be; what is wrong with a row is in its result.
+    motions; rows that are already in it are not generated again, and processes beside this one do the work. Without
+    ``out`` this process generates the motions one after the other and keeps none: each `Result` has its motion. force:
+    take a folder that holds another job's motions, which then go. Raises `MotionloomError` for jobs, options and
+    folders that cannot be; what is wrong with a row is in its result.
     """
     if out is None:
         check_options(options)
@@ -77,16 +77,16 @@ def run(
     rows: int | None = None,
     force: bool = False,
 ) -> Iterator[Report]:
-    """Make what is missing of a batch's folder; a report of each shard when it is whole, those that were at once.
+    """Generate what is missing of a batch's folder; a report of each shard when it is whole, those that were at once.
 
-    moved: called with how many more rows were made. rows: how many the job has, where that is known. force: as of
+    moved: called with how many more rows are finished. rows: how many the job has, where that is known. force: as of
     `batch`.
     """
     check_options(options)
     count = jobs.count() if rows is None else rows
     check_jobs(jobs, count)
     shard_rows = options.shard_rows or shard_size(count)
-    check_settings(out, options, rows=count, shard_rows=shard_rows, force=force)  # before anything is made
+    check_settings(out, options, rows=count, shard_rows=shard_rows, force=force)  # before anything is generated
     with claim(out, where.shard or (0, 1)) as claimed:
         if not force:
             _check_same_job(jobs, out, options)
@@ -105,13 +105,13 @@ def run(
             _with_whole_paths(options),
             claimed.driver.name,
         )
-        made = 0
+        new_rows = 0
         for report in _reports(_items(jobs, size, store, where.shard or (0, 1)), work, where, moved):
             claimed.check()
-            made += report.made
+            new_rows += report.new_rows
             yield report
-        whole = all(store.record(shard).exists() for shard in range(shards))  # whoever made them
-        if whole and (made or damaged_table(store) is not None):
+        whole = all(store.record(shard).exists() for shard in range(shards))  # of all drivers
+        if whole and (new_rows or damaged_table(store) is not None):
             write_table(store, shards)
 
 
@@ -191,34 +191,34 @@ def array_task(environment: Mapping[str, str] = os.environ) -> tuple[int, int] |
 
 
 def _here(jobs: Jobs, options: Options) -> Iterator[Result]:
-    """Every row made in this process, a few at a time."""
+    """Every row generated in this process, a few at a time."""
     maker = Maker(options, folder=jobs.folder)
     passes = Filter(options.filter) if options.filter else None
     number = 0
     for rows in jobs.shards(4 * maker.together):
-        found: dict[int, Result] = {}
-        asked = {}
+        results: dict[int, Result] = {}
+        orders = {}
         for offset, raw in enumerate(rows):
             try:
-                asked[number + offset] = maker.sources.ask(parse(raw))
+                orders[number + offset] = maker.sources.ask(parse(raw))
             except MotionloomError as error:
-                found[number + offset] = result({"row": number + offset, "state": "failed", "error": str(error)})
-        places = {id(one): place for place, one in asked.items()}
-        for one, made in maker.make(list(asked.values())):
+                results[number + offset] = result({"row": number + offset, "state": "failed", "error": str(error)})
+        places = {id(one): place for place, one in orders.items()}
+        for one, take in maker.make(list(orders.values())):
             place = places[id(one)]
             known = {"row": place, "id": one.id, "key": one.key, "text": one.text, "seed": one.seed}
-            if not isinstance(made, Made):
-                found[place] = result({**known, "state": "failed", "error": made})
-            elif made.passes(passes):
-                found[place] = result({**known, "state": "made", **made.measures}, made.people)
+            if not isinstance(take, Made):
+                results[place] = result({**known, "state": "failed", "error": take})
+            elif take.passes(passes):
+                results[place] = result({**known, "state": "made", **take.measures}, take.people)
             else:
-                found[place] = result({**known, "state": "dropped", **made.measures})
-        yield from (found[place] for place in sorted(found))
+                results[place] = result({**known, "state": "dropped", **take.measures})
+        yield from (results[place] for place in sorted(results))
         number += len(rows)
 
 
 def _items(jobs: Jobs, size: int, store: Store, share: tuple[int, int]) -> Iterator[Task | Report]:
-    """What is to be made of one's share, and reports of what is there already."""
+    """What is missing of a driver's share, and reports of what is there already."""
     number, of = share
     for shard, rows in enumerate(jobs.shards(size)):
         if shard % of != number:
@@ -232,7 +232,7 @@ def _items(jobs: Jobs, size: int, store: Store, share: tuple[int, int]) -> Itera
 
 
 def _is_done(head: Head, rows: list[bytes]) -> bool:
-    """Whether a shard holds what these rows ask, as far as the rows alone show; what failed is to be tried again."""
+    """Whether a shard holds these rows' motions, as far as the rows alone show; what failed is to be tried again."""
     return not head.names_files and head.counts.get("failed", 0) == head.refused and head.digest == digest(rows)
 
 
@@ -255,31 +255,31 @@ def processes(options: Options) -> int:
 
 
 def _check_same_job(jobs: Jobs, out: Path, options: Options) -> None:
-    """Raise `MotionloomError` where the first shards of a folder hold motions, and this job asks for none of them."""
+    """Raise `MotionloomError` where the first shards of a folder hold motions, and this job has none of them."""
     manifest = read_manifest(out)
     if manifest is None:
         return
     store, size = Store(out, manifest["files"]), int(manifest["shard_rows"])
-    there, made, asked = set(sorted(store.shards())[:LOOKED_AT]), set(), set()
+    there, old, new = set(sorted(store.shards())[:LOOKED_AT]), set(), set()
     for shard, rows in zip(range(max(there, default=-1) + 1), jobs.shards(size)):
         if shard not in there or (head := store.head(shard)) is None:
             continue
         if head.digest == digest(rows):
             return
-        made |= {(one["text"], one["seed"]) for one in store.entries(shard) if one["state"] == "made"}
-        asked |= {_words(raw, options.seed) for raw in rows}
-    if made and None not in asked and not made & asked:
+        old |= {(one["text"], one["seed"]) for one in store.entries(shard) if one["state"] == "made"}
+        new |= {_words(raw, options.seed) for raw in rows}
+    if old and None not in new and not old & new:
         raise MotionloomError(
-            f"{out} holds motions of another job: none of the first {len(made):,} is in this job; "
+            f"{out} holds motions of another job: none of the first {len(old):,} is in this job; "
             "name another folder, or replace them with --force"
         )
 
 
 def _words(raw: bytes, seed: int) -> tuple[str, int] | None:
-    """The words and the seed of a row; None where a timeline, which is not read here, says them."""
+    """The words and the seed of a row; None where a timeline, which is not read here, has them."""
     try:
         row = parse(raw)
     except MotionloomError:
         return "", -1
-    said = row.prompt or row.motion or ""
-    return None if row.timeline is not None else (said, seed if row.seed is None else row.seed)
+    words = row.prompt or row.motion or ""
+    return None if row.timeline is not None else (words, seed if row.seed is None else row.seed)

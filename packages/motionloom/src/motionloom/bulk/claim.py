@@ -42,13 +42,13 @@ Share = tuple[int, int]
 
 @dataclass(frozen=True)
 class Driver:
-    """Who makes a share of a batch."""
+    """The process that generates a share of a batch."""
 
     name: str
     """Of its own: nobody else has it."""
     host: str
     machine: str
-    """What tells machines of one name apart, and two starts of one; processes of one machine see each other."""
+    """What distinguishes machines of one name, and two starts of one; processes of one machine see each other."""
     pid: int
     begun: str
     """When the process began, as its machine counts: another one may get the number of one that ended."""
@@ -68,7 +68,7 @@ class Driver:
 
 
 class Claim:
-    """A share of a folder that this process has; made by `claim`."""
+    """A share of a folder that this process has; created by `claim`."""
 
     def __init__(self, place: Path, driver: Driver) -> None:
         self.place, self.driver = place, driver
@@ -87,8 +87,8 @@ class Claim:
         """Give the share back."""
         self._over.set()
         with suppress(OSError):
-            found = _read(self.place.read_bytes())
-            if found is not None and found.name == self.driver.name:
+            owner = _read(self.place.read_bytes())
+            if owner is not None and owner.name == self.driver.name:
                 self.place.unlink()
         with suppress(OSError):  # others work there, or left something behind
             self.place.parent.rmdir()
@@ -96,8 +96,8 @@ class Claim:
     def _beat(self) -> None:
         while not self._over.wait(BEAT):
             try:
-                found = _read(self.place.read_bytes())
-                if found is not None and found.name == self.driver.name:
+                owner = _read(self.place.read_bytes())
+                if owner is not None and owner.name == self.driver.name:
                     os.utime(self.place)
                     continue
             except FileNotFoundError:
@@ -110,9 +110,9 @@ class Claim:
 
 @contextmanager
 def claim(out: Path, share: Share) -> Iterator[Claim]:
-    """Hold a share of the folder, which is made if it is missing, during the block.
+    """Hold a share of the folder, which is created if it is missing, during the block.
 
-    Raises `MotionloomError` where a living driver has one of its shards, and says who; warns where a dead one had.
+    Raises `MotionloomError` where a living driver has one of its shards, and names it; warns where a dead one had.
     """
     work = out / WORK
     try:
@@ -170,23 +170,23 @@ def _write(place: Path, driver: Driver) -> None:
 
 def _gone(work: Path, share: Share) -> dict[Path, Driver | None]:
     """Claims on shards of the share whose drivers are gone; raises `MotionloomError` where one lives."""
-    found = dict(_others(work, share))
-    for place, driver in found.items():
+    claims = dict(_others(work, share))
+    for place, driver in claims.items():
         if not _is_gone(place, driver):
             raise MotionloomError(
                 f"{work.parent} is being made by {driver or 'somebody else'}; wait for it or end it, or give every "
                 "driver a share of its own with --shard i/n"
             )
-    return found
+    return claims
 
 
 def _others(work: Path, share: Share) -> Iterator[tuple[Path, Driver | None]]:
     """Claims on shards of the share, and whose they are; None: it cannot be read."""
     for place in sorted(work.glob("driver-*.json")):
-        found = _NAME.fullmatch(place.name)
-        if found is None:
+        match = _NAME.fullmatch(place.name)
+        if match is None:
             continue
-        first, count = int(found[1]), max(int(found[2]), 1)
+        first, count = int(match[1]), max(int(match[2]), 1)
         if (first - share[0]) % math.gcd(count, share[1]) == 0:
             with suppress(FileNotFoundError):
                 yield place, _read(place.read_bytes())
@@ -194,8 +194,8 @@ def _others(work: Path, share: Share) -> Iterator[tuple[Path, Driver | None]]:
 
 def _read(data: bytes) -> Driver | None:
     try:
-        found = json.loads(data)
-        return Driver(**{**{name: str(value) for name, value in found.items()}, "pid": int(found["pid"])})
+        values = json.loads(data)
+        return Driver(**{**{name: str(value) for name, value in values.items()}, "pid": int(values["pid"])})
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return None
 
@@ -206,12 +206,12 @@ def _is_gone(place: Path, driver: Driver | None) -> bool:
         return _start_of(driver.pid) != driver.begun
     first = None
     while True:
-        found = _beats(place)
-        if found is None or found[1] - found[0] > STALE:
+        beats = _beats(place)
+        if beats is None or beats[1] - beats[0] > STALE:
             return True
-        if first is not None and found[0] > first:
+        if first is not None and beats[0] > first:
             return False
-        first = found[0]
+        first = beats[0]
         time.sleep(LOOK)
 
 

@@ -22,8 +22,10 @@ from motionloom.errors import MotionloomError
 STILLBORN = 3
 """Processes in a row that may die before they are ready."""
 
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+"""Environment of a process on one core."""
 Moved = Callable[[int], None]
-"""Called with how many more rows were made."""
+"""Called with how many more rows are finished."""
 
 
 def cores() -> int:
@@ -32,7 +34,7 @@ def cores() -> int:
 
 
 def gpus() -> int:
-    """GPUs of this machine, as NVIDIA's driver lists them; 1 where it does not, so that processes say what is wrong."""
+    """GPUs of this machine, as NVIDIA's driver lists them; 1 where it does not, so that processes report it."""
     return max(len(list(Path("/proc/driver/nvidia/gpus").glob("*"))), 1)
 
 
@@ -41,8 +43,8 @@ def gpu_of(process: int, visible: str, count: int) -> str:
 
     Where there are more processes than GPUs, some share one.
     """
-    given = [place for place in visible.split(",") if place] or [str(number) for number in range(count)]
-    return given[process % len(given)]
+    devices = [place for place in visible.split(",") if place] or [str(number) for number in range(count)]
+    return devices[process % len(devices)]
 
 
 def search_path() -> str:
@@ -67,7 +69,7 @@ class Again:
 
 
 def _cause(code: int | None) -> str:
-    """What can be said of how a process ended: one that was killed may have wanted too much memory."""
+    """How a process ended: one that was killed may have wanted too much memory."""
     if code is not None and code < 0:
         return f"signal {-code}: is there enough memory?"
     return f"exit code {code}: what they printed says more"
@@ -85,8 +87,7 @@ class _Process:
     popen: "subprocess.Popen[bytes]" = field(init=False)
 
     def __post_init__(self) -> None:
-        environment = {**os.environ, "PYTHONPATH": search_path()}
-        environment |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+        environment = {**os.environ, "PYTHONPATH": search_path(), **ONE_THREAD}
         if self.batch.options.device == "cuda":
             environment["CUDA_VISIBLE_DEVICES"] = gpu_of(
                 self.number, os.environ.get("CUDA_VISIBLE_DEVICES", ""), gpus()
@@ -171,8 +172,8 @@ class _Crew:
                 yield item
                 continue
             if idle is None:
-                taken = {process.number for process in self.processes}
-                number = next(n for n in range(self.workers) if n not in taken)
+                numbers = {process.number for process in self.processes}
+                number = next(n for n in range(self.workers) if n not in numbers)
                 idle = _Process(number, self.batch, self.received)
                 self.processes.append(idle)
             idle.give(item)

@@ -10,7 +10,7 @@ from pathlib import Path
 from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.measures import Filter
-from motionloom.bulk.row import Asked, parse
+from motionloom.bulk.row import Order, parse
 from motionloom.bulk.shard import entry_of
 from motionloom.bulk.writers import sizes, writer
 from motionloom.errors import MotionloomError
@@ -26,7 +26,7 @@ class Estimate:
     rows: int
     sampled: int
     usable: float
-    """Share of the sampled rows that can be made and pass the filter."""
+    """Share of the sampled rows that can be generated and pass the filter."""
     seconds_each: float
     """Of one core for one row."""
     bytes_each: float
@@ -45,35 +45,35 @@ class Estimate:
 
 
 def estimate(jobs: Jobs, options: Options, *, workers: int) -> Estimate:
-    """Make a random sample of the rows once in this process; nothing is kept of it.
+    """Generate a random sample of the rows once in this process; nothing is kept of it.
 
     One pass through the job counts its rows and draws the sample. The first call of a network is not counted.
     """
     rows, chosen = _sampled(jobs, SAMPLE)
     maker = Maker(options, folder=jobs.folder)
-    asked: list[Asked] = []
+    orders: list[Order] = []
     problems: list[MotionloomError] = []
     for raw in chosen:
         try:
-            asked.append(maker.sources.ask(parse(raw)))
+            orders.append(maker.sources.ask(parse(raw)))
         except MotionloomError as error:
             problems.append(error)
-    if not asked:
+    if not orders:
         raise MotionloomError(f"none of {len(chosen)} rows looked at can be made; see: {problems[0]}")
-    list(maker.make(asked[:1]))
+    list(maker.make(orders[:1]))
     passes = Filter(options.filter) if options.filter else None
     with tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
-        began, kept = time.perf_counter(), 0
+        began, count = time.perf_counter(), 0
         file = writer(options.format, Path(folder) / "data")
-        unique = {one.id: one for one in asked}
-        for one, made in maker.make(list(unique.values())):
-            if isinstance(made, Made) and made.passes(passes):
-                file.add(made, entry_of(one, made))
-                kept += 1
+        unique = {one.id: one for one in orders}
+        for one, take in maker.make(list(unique.values())):
+            if isinstance(take, Made) and take.passes(passes):
+                file.add(take, entry_of(one, take))
+                count += 1
         file.close()
         seconds, size = time.perf_counter() - began, sizes(Path(folder) / "data")["bytes"]
-    usable = kept / len(unique) * len(asked) / len(chosen)
-    return Estimate(rows, len(chosen), usable, seconds / len(unique), size / max(kept, 1), workers)
+    usable = count / len(unique) * len(orders) / len(chosen)
+    return Estimate(rows, len(chosen), usable, seconds / len(unique), size / max(count, 1), workers)
 
 
 def _sampled(jobs: Jobs, count: int) -> tuple[int, Sequence[bytes]]:

@@ -37,7 +37,7 @@ CHECK = "sha256"
 STATES = ("made", "dropped", "failed", "repeated")
 
 Entry = dict[str, Any]
-"""What a record says of one row."""
+"""The record of one row."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Head:
     counts: dict[str, int]
     """Rows by what became of them, one of `STATES`."""
     refused: int = 0
-    """How many of the failed ones cannot be made as they are written, whoever tries."""
+    """How many of the failed ones cannot be generated as they are written."""
     sha256: dict[str, str] = field(default_factory=dict)
     """Of every file of the shard's data, by its name; nothing in a folder of before there were hashes."""
     record: str = ""
@@ -83,45 +83,45 @@ class Store:
 
     @property
     def work(self) -> Path:
-        """Where shards are made; nobody reads there."""
+        """Where shards are written first; nobody reads there."""
         return self.out / WORK
 
     def new_work(self, shard: int, driver: str) -> Path:
-        """A folder to make a shard in, of its own for whoever calls: two who make the same shard keep apart."""
+        """A folder to write a shard in, of its own for each call: two that write the same shard keep apart."""
         place = self.work / f"{shard:06d}.{driver or 'nobody'}.{os.urandom(4).hex()}"
         place.mkdir(parents=True)
         return place
 
     def clear_work(self, shard: int, *, but: Collection[str] = ()) -> None:
-        """Remove what others made of a shard, who were killed; ``but``: drivers whose work stays, since they live."""
+        """Remove what killed processes wrote of a shard; ``but``: drivers whose work stays, since they live."""
         for place in self.work.glob(f"{shard:06d}.*/"):
             if place.name.split(".")[1] not in but:
                 shutil.rmtree(place, ignore_errors=True)
 
     def attempts(self, shard: int) -> Path:
-        """Where it is noted what was begun and not ended: of a shard that was made, nothing."""
+        """Where it is noted what was begun and not ended: of a finished shard, nothing."""
         return self.work / f"{shard:06d}.attempts"
 
     def head(self, shard: int) -> Head | None:
-        """What the record says of its shard, if it is whole, and the data are as many and as large as it says."""
-        found = self._record(shard)
-        if found is None or (found[0].data["files"] and sizes(self.data(shard)) != found[0].data):
+        """The head of a shard's record, if it is whole and fits the number and size of the data."""
+        record = self._record(shard)
+        if record is None or (record[0].data["files"] and sizes(self.data(shard)) != record[0].data):
             return None
-        return found[0]
+        return record[0]
 
     def entries(self, shard: int) -> Iterator[Entry]:
         """What became of each row of a shard, in their order; `MotionloomError` where its record is not whole."""
-        found = self._record(shard)
-        if found is None:
+        record = self._record(shard)
+        if record is None:
             raise damaged_shard(self, shard)
-        yield from found[1]
+        yield from record[1]
 
     def damage(self, shard: int) -> list[Path]:
         """Files of a shard that are not as they were written, missing ones and foreign ones too; the record first."""
-        found = self._record(shard)
-        if found is None:
+        record = self._record(shard)
+        if record is None:
             return [self.record(shard)]
-        head, data = found[0], self.data(shard)
+        head, data = record[0], self.data(shard)
         if not head.data["files"]:
             return []
         if not data.exists():
@@ -132,10 +132,10 @@ class Store:
         wrong = sorted(name for name in head.sha256.keys() | there.keys() if head.sha256.get(name) != there.get(name))
         return [data / name if data.is_dir() else data for name in wrong]
 
-    def says(self, shard: int, entries: Sequence[Entry], head: Head) -> bool:
+    def is_recorded(self, shard: int, entries: Sequence[Entry], head: Head) -> bool:
         """Whether the record of a shard is this one already."""
-        found = self._record(shard)
-        return found is not None and found == (replace(head, record=found[0].record), list(entries))
+        record = self._record(shard)
+        return record is not None and record == (replace(head, record=record[0].record), list(entries))
 
     def _record(self, shard: int) -> tuple[Head, list[Entry]] | None:
         """The record of a shard, if it is whole."""
@@ -153,7 +153,7 @@ class Store:
     def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head, *, old: Path) -> None:
         """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows.
 
-        old: where to put a folder that was there before.
+        old: where to move a folder that was there before.
         """
         target = self.data(shard)
         if data is not None:
@@ -191,17 +191,17 @@ def _hash_record(head: Head, lines: Sequence[bytes]) -> str:
 
 def digest(rows: Sequence[bytes]) -> str:
     """Hash of rows as they are written in the job."""
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for row in rows:
-        found.update(len(row).to_bytes(8, "little"))
-        found.update(row)
-    return found.hexdigest()
+        sha256.update(len(row).to_bytes(8, "little"))
+        sha256.update(row)
+    return sha256.hexdigest()
 
 
 def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
     """The manifest of a batch."""
     card, weights = read_card(find_weights(options.weights)), hash_weights(options)
-    found = {
+    manifest = {
         "kind": KIND,
         "format": FORMAT,
         "version": version("motionloom"),
@@ -221,18 +221,18 @@ def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
         "shard_rows": shard_rows,
         "measures": MEANING | ROBOT,
     }
-    return found | {CHECK: _hash_manifest(found)}
+    return manifest | {CHECK: _hash_manifest(manifest)}
 
 
-def _hash_manifest(found: dict[str, Any]) -> str:
-    others = {key: value for key, value in found.items() if key != CHECK}
+def _hash_manifest(manifest: dict[str, Any]) -> str:
+    others = {key: value for key, value in manifest.items() if key != CHECK}
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
 
 def _of_robot(options: Options) -> dict[str, Any]:
-    """What is said of robots; nothing where nothing is: older folders hold."""
-    said = {"robot": _hash(options.robot), "robot_map": _hash(options.robot_map), **options.of_robots()}
-    return {name: value for name, value in said.items() if value}
+    """The settings of robots; nothing where there are none, so that older folders hold."""
+    values = {"robot": _hash(options.robot), "robot_map": _hash(options.robot_map), **options.of_robots()}
+    return {name: value for name, value in values.items() if value}
 
 
 def _hash(name: str | None) -> str | None:
@@ -241,7 +241,7 @@ def _hash(name: str | None) -> str | None:
 
 
 def read_manifest(out: Path, *, anew: bool = False) -> dict[str, Any] | None:
-    """What the folder says it is; None where it says nothing.
+    """The manifest of a folder; None where it has none.
 
     anew: also where its manifest is lost or damaged, and is to be written again. Raises `MotionloomError` if that is no
     batch.
@@ -255,25 +255,30 @@ def read_manifest(out: Path, *, anew: bool = False) -> dict[str, Any] | None:
             raise _damaged(f"{place} is lost")
         raise MotionloomError(f"{out} holds other files and no {MANIFEST}; name a folder of its own for the batch")
     try:
-        found = json.loads(place.read_text(encoding="utf-8"))
-        whole = CHECK not in found or found[CHECK] == _hash_manifest(found)
+        manifest = json.loads(place.read_text(encoding="utf-8"))
+        whole = CHECK not in manifest or manifest[CHECK] == _hash_manifest(manifest)
     except (OSError, ValueError, TypeError, RecursionError):
-        found, whole = {}, False
+        manifest, whole = {}, False
     if batch and not whole:
         if anew:
             return None
         raise _damaged(f"{place} is damaged")
     try:
-        good = found["kind"] == KIND and int(found["shard_rows"]) >= 1 and found["files"] and int(found["rows"]) >= 1
+        good = (
+            manifest["kind"] == KIND
+            and int(manifest["shard_rows"]) >= 1
+            and manifest["files"]
+            and int(manifest["rows"]) >= 1
+        )
     except (ValueError, KeyError, TypeError, OverflowError):
         good = False
     if not good:
         raise MotionloomError(f"{place} does not describe a batch; name another folder or delete it")
-    if found.get("format") != FORMAT:
+    if manifest.get("format") != FORMAT:
         raise MotionloomError(
-            f"{place} has the format {found.get('format')}; this motionloom makes {FORMAT}: use another folder"
+            f"{place} has the format {manifest.get('format')}; this motionloom makes {FORMAT}: use another folder"
         )
-    return found
+    return manifest
 
 
 def find_batch(folder: Path) -> tuple[Store, int]:
@@ -298,40 +303,40 @@ def check_settings(
 
     force: write a damaged one anew. Raises `MotionloomError` for a folder of something else or of other settings.
     """
-    found = read_manifest(check_folder(out), anew=force)
-    wanted = about(options, rows=rows, shard_rows=shard_rows if found is None else int(found["shard_rows"]))
-    if found is None:
-        return None, wanted
+    manifest = read_manifest(check_folder(out), anew=force)
+    expected = about(options, rows=rows, shard_rows=shard_rows if manifest is None else int(manifest["shard_rows"]))
+    if manifest is None:
+        return None, expected
     for part in ("weights", "motions", "duets", "defaults", "files", "filter", "judge"):
-        if found.get(part) != wanted[part]:
-            was, now = _difference(found.get(part), wanted[part])
+        if manifest.get(part) != expected[part]:
+            was, now = _difference(manifest.get(part), expected[part])
             raise MotionloomError(f"{out} was made with other settings: {part} {was}, not {now}; name another folder")
-    if options.shard_rows not in (None, wanted["shard_rows"]):
+    if options.shard_rows not in (None, expected["shard_rows"]):
         raise MotionloomError(
-            f"{out} has shards of {wanted['shard_rows']:,} rows, not {options.shard_rows:,}; name another folder"
+            f"{out} has shards of {expected['shard_rows']:,} rows, not {options.shard_rows:,}; name another folder"
         )
-    return found, wanted
+    return manifest, expected
 
 
 def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int, force: bool = False) -> dict[str, Any]:
-    """Make the folder, or check that it was made the same way; its manifest, whose ``shard_rows`` counts.
+    """Create the folder, or check that it has the same settings; its manifest, whose ``shard_rows`` counts.
 
     Raises `MotionloomError` as `check_settings` does.
     """
-    found, wanted = check_settings(out, options, rows=rows, shard_rows=shard_rows, force=force)
+    manifest, expected = check_settings(out, options, rows=rows, shard_rows=shard_rows, force=force)
     try:
         for place in (out, out / RECORDS, out / WORK):
             place.mkdir(exist_ok=True)
     except OSError as error:
         raise MotionloomError(f"cannot write to {out}: {error.strerror or error}") from None
-    if found != wanted:
+    if manifest != expected:
         with atomic_path(out / MANIFEST) as temporary:
-            temporary.write_text(json.dumps(wanted, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return wanted
+            temporary.write_text(json.dumps(expected, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return expected
 
 
 def _difference(was: Any, now: Any) -> tuple[str, str]:
-    """What differs, as briefly as it can be said."""
+    """What differs, in short."""
     if isinstance(was, dict) and isinstance(now, dict):
         keys = [key for key in now if was.get(key) != now[key]]
         return tuple(", ".join(f"{key} {side.get(key)}" for key in keys) for side in (was, now))  # type: ignore[return-value]

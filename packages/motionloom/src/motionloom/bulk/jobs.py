@@ -27,9 +27,9 @@ MAX_COLUMNS = 200
 MAX_LINE = 4_000_000
 """Bytes of one row."""
 LARGEST = 1000
-"""Rows of a shard, unless asked otherwise."""
+"""Rows of a shard by default."""
 MOST = 10_000
-"""Rows of a shard that may be asked for: a process has all of them in memory."""
+"""Rows of a shard at most: a process has all of them in memory."""
 SMALLEST, SHARDS = 8, 64
 """A small job is cut into about so many shards, so that every core has something to do until the end."""
 
@@ -84,16 +84,16 @@ class Jobs:
         """
         folder = Path(folder)
         kinds = formats.readable()
-        found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in kinds and one.is_file())
-        if not found:
+        files = sorted(one for one in folder.rglob("*") if one.suffix.lower() in kinds and one.is_file())
+        if not files:
             raise MotionloomError(f"{folder} holds no motion files ({', '.join(kinds)}); name a folder that does")
-        names = [one.relative_to(folder) for one in found]
+        names = [one.relative_to(folder) for one in files]
         ids = [re.sub(r"[^A-Za-z0-9_-]", "_", "_".join(one.with_suffix("").parts))[:90] for one in names]
-        seen: Counter[str] = Counter()
+        counts: Counter[str] = Counter()
         rows = []
         for name, one in zip(names, ids):
-            seen[one] += 1
-            rows.append({"motion": name.as_posix(), "id": one if seen[one] == 1 else f"{one}-{seen[one]}"})
+            counts[one] += 1
+            rows.append({"motion": name.as_posix(), "id": one if counts[one] == 1 else f"{one}-{counts[one]}"})
         return Jobs(folder, tuple(rows))
 
     @property
@@ -136,7 +136,7 @@ class Jobs:
 
 
 def shard_size(rows: int) -> int:
-    """Rows of a shard of a job of so many rows: the same whoever asks."""
+    """Rows of a shard of a job of so many rows: the same for every driver."""
     size = min(max(-(-rows // SHARDS), SMALLEST), LARGEST)
     shards = max(-(-rows // size), 1)
     return max(-(-rows // shards), 1)

@@ -8,7 +8,7 @@ from typing import Any
 
 from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
 from motionloom.bulk.on_robot import OnRobot, Save, check_format, on_robot
-from motionloom.bulk.row import Asked, Sources, hash_adapters, unexpected
+from motionloom.bulk.row import Order, Sources, hash_adapters, unexpected
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.roles import prompts_of
@@ -33,34 +33,34 @@ FORMATS = ("npz", "csv", "bvh", "glb", "webdataset", "parquet")
 
 @dataclass(frozen=True)
 class Options:
-    """How the motions of a batch are made, and what becomes of them; all of it plain values."""
+    """How the motions of a batch are generated, and what becomes of them; all of it plain values."""
 
     weights: str = "default"
     """A shipped name or a file."""
     adapters: Sequence[str] = ()
     """What was taught from clips: ``FILE`` or ``FILE:FACTOR``, see `motionloom.goals.adapters.parse_adapter`."""
     pair_weights: str = "duet"
-    """What makes two people of one: a shipped name or a file."""
+    """The weights for two people: a shipped name or a file."""
     pair_guidance: float = 1.0
     """How firmly two people keep to where that wants them, 0 to 1."""
     device: str = "cpu"
-    """Let the network compute in bfloat16."""
+    """Where the network computes: cpu or cuda."""
     best_of: int = 1
-    """Seeds that are tried for each motion of a prompt, of rows that do not say."""
+    """Seeds that are tried for each motion of a prompt, of rows without it."""
     steps: int = STEPS
     guidance: float = GUIDANCE
     solver: str = SOLVER
     raw: bool = False
-    """Leave the feet as the network drew them."""
+    """Leave the feet as the network generated them."""
     loop: float | None = None
-    """Seconds at the end of each motion that are drawn anew, so that its beginning can follow; None: it ends as it
+    """Seconds at the end of each motion that are sampled anew, so that its beginning can follow; None: it ends as it
     will."""
     fps: float | None = None
     """Frames per second of the files; None: the weights' own."""
     seconds: float = 5.0
-    """Length of rows that do not say."""
+    """Length of rows without one."""
     seed: int = 0
-    """Seed of rows that do not say."""
+    """Seed of rows without one."""
     skeleton: str | None = None
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
     hands: HandPose = "as-is"
@@ -71,7 +71,7 @@ class Options:
     """A robot's model, onto which motions of rows go that name none and no skeleton; None: no robot."""
     robot_map: str | None = None
     max_speed: float | None = None
-    """Radians per second that no joint of a robot exceeds, where a row does not say."""
+    """Radians per second that no joint of a robot exceeds, of rows without it."""
     avoid_collisions: bool = False
     format: str = "npz"
     """One of `FORMATS`."""
@@ -84,7 +84,7 @@ class Options:
     filter: str | None = None
     """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
     judge: str | None = None
-    """``module:function`` that says whether a motion obeys its prompt; see `motionloom.bulk.measures.Judge`."""
+    """``module:function`` that decides whether a motion obeys its prompt; see `motionloom.bulk.measures.Judge`."""
 
     def of_motions(self, weights: str) -> dict[str, Any]:
         """What determines every motion of the batch; ``weights``: `hash_weights`."""
@@ -105,7 +105,7 @@ class Options:
         }
 
     def of_robots(self) -> dict[str, Any]:
-        """What no joint of a robot exceeds, and whether its parts are kept apart, where rows do not say."""
+        """What no joint of a robot exceeds, and whether its parts are kept apart, of rows without it."""
         return {"max_speed": self.max_speed, "avoid_collisions": self.avoid_collisions}
 
     def on_robot(self) -> OnRobot | None:
@@ -121,7 +121,7 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A motion that was made of a row."""
+    """The motion of a row."""
 
     people: tuple[Motion, ...]
     """One person, or two in one world."""
@@ -150,25 +150,25 @@ def hash_weights(options: Options) -> str:
 
     Raises `MotionloomError` for an adapter that is no file.
     """
-    found = weights_digest(find_weights(options.weights))
+    digest = weights_digest(find_weights(options.weights))
     if not options.adapters:
-        return found
-    said = [found, *hash_adapters([parse_adapter(one) for one in options.adapters])]
-    return hashlib.sha256("\n".join(said).encode()).hexdigest()
+        return digest
+    hashes = [digest, *hash_adapters([parse_adapter(one) for one in options.adapters])]
+    return hashlib.sha256("\n".join(hashes).encode()).hexdigest()
 
 
 class Maker:
-    """A prior that is ready to make rows, and what it makes them with.
+    """A prior that is ready to generate rows, and its settings.
 
     ``weights``, ``pair``: what `hash_weights` and `Options.of_duets` must give, where that is known beforehand.
-    Raises `MotionloomError` for options that no motion can be made with.
+    Raises `MotionloomError` for options that no motion can be generated with.
     """
 
     def __init__(
         self, options: Options, *, folder: Path, weights: str | None = None, pair: dict[str, Any] | None = None
     ) -> None:
-        path, found, duets = find_weights(options.weights), hash_weights(options), options.of_duets()
-        if weights is not None and found != weights:
+        path, digest, duets = find_weights(options.weights), hash_weights(options), options.of_duets()
+        if weights is not None and digest != weights:
             which = f"{path} or an adapter" if options.adapters else str(path)
             raise MotionloomError(f"{which} differs from what this batch is made with; use the same files")
         if pair is not None and duets != pair:
@@ -182,7 +182,7 @@ class Maker:
         check_features(self.prior)
         self.sources = Sources(
             folder,
-            options.of_motions(found),
+            options.of_motions(digest),
             pair=duets,
             fps=self.prior.fps,
             seconds=options.seconds,
@@ -197,45 +197,45 @@ class Maker:
         self.together = TOGETHER.get(options.device.partition(":")[0], TOGETHER["cpu"])
 
     def make(
-        self, asked: Sequence[Asked], *, begin: Callable[[Asked], None] | None = None
-    ) -> Iterator[tuple[Asked, Made | str]]:
+        self, todo: Sequence[Order], *, begin: Callable[[Order], None] | None = None
+    ) -> Iterator[tuple[Order, Made | str]]:
         """Each row with its motion, or with a sentence that says why there is none; rows of like lengths first.
 
-        begin: called before each row, which is then made alone. Rows that are made together and fail are tried alone.
+        begin: called before each row, which is then sampled alone. Rows that fail together are tried alone.
         """
-        for rows in self._shared(asked, alone=begin is not None):
+        for rows in self._shared(todo, alone=begin is not None):
             if begin is not None:
                 begin(rows[0])
             yield from self._try(rows)
 
-    def _shared(self, asked: Sequence[Asked], *, alone: bool) -> Iterator[list[Asked]]:
-        """Rows that are made together."""
+    def _shared(self, todo: Sequence[Order], *, alone: bool) -> Iterator[list[Order]]:
+        """Rows that are sampled together."""
         together = 1 if alone else self.together
-        same: dict[Any, list[Asked]] = {}
-        for one in sorted(asked, key=lambda one: -one.frames):
+        same: dict[Any, list[Order]] = {}
+        for one in sorted(todo, key=lambda one: -one.frames):
             if one.row.task == "generate" and one.timeline is None:
                 same.setdefault((-(-one.frames // self.prior.net.config.patch), one.best_of), []).append(one)
-        for one in asked:
+        for one in todo:
             if one.row.task == "control":
                 same.setdefault((id(one.goal), one.best_of, "control"), []).append(one)
         for rows in same.values():
             yield from (rows[at : at + together] for at in range(0, len(rows), together))
-        yield from ([one] for one in asked if one.row.task in ("duet", "export") or one.timeline is not None)
+        yield from ([one] for one in todo if one.row.task in ("duet", "export") or one.timeline is not None)
 
-    def _try(self, rows: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
+    def _try(self, rows: list[Order]) -> Iterator[tuple[Order, Made | str]]:
         try:
-            found: list[tuple[Asked, Made | str]] = list(zip(rows, self._make_all(rows), strict=True))
+            results: list[tuple[Order, Made | str]] = list(zip(rows, self._make_all(rows), strict=True))
         except MotionloomError as error:
-            found = [(rows[0], str(error))]
+            results = [(rows[0], str(error))]
         except Exception as error:  # a row that breaks the program breaks itself alone
-            found = [(rows[0], str(unexpected(error, "it could not be made")))]
-        if len(found) == len(rows):
-            yield from found
+            results = [(rows[0], str(unexpected(error, "it could not be made")))]
+        if len(results) == len(rows):
+            yield from results
             return
         for row in rows:
             yield from self._try([row])
 
-    def _make_all(self, rows: list[Asked]) -> list[Made]:
+    def _make_all(self, rows: list[Order]) -> list[Made]:
         for one in rows:
             check_format(self.options.format, robot=one.robot is not None)
         first = rows[0]
@@ -248,20 +248,20 @@ class Maker:
         if first.row.task == "duet":
             return [self._duet(first)]
         if first.timeline is not None:
-            [made] = run(self._plan(first), self.models)
-            kept = {} if made.about is None else {"keeps": all(one.kept for one in made.about.amounts)}
-            return [self._measured(first, made.people[0], **kept)]
-        made = [one for _, one in run_each([self._plan(one) for one in rows], self.models)]
+            [result] = run(self._plan(first), self.models)
+            keeps = {} if result.about is None else {"keeps": all(one.kept for one in result.about.amounts)}
+            return [self._measured(first, result.people[0], **keeps)]
+        results = [one for _, one in run_each([self._plan(one) for one in rows], self.models)]
         return [
             self._measured(one, result.people[0], **_misses(result.about))
-            for one, result in zip(rows, made, strict=True)
+            for one, result in zip(rows, results, strict=True)
         ]
 
-    def _plan(self, asked: Asked) -> Plan:
-        options, row, timeline = self.options, asked.row, asked.timeline
+    def _plan(self, order: Order) -> Plan:
+        options, row, timeline = self.options, order.row, order.timeline
         task = row.task or "generate"
-        goals = (None, asked.goal) if row.whom else (asked.goal, None)
-        said = {
+        goals = (None, order.goal) if row.whom else (order.goal, None)
+        values = {
             "prompt": row.prompt,
             "as_one": (task == "generate" and timeline is None) or None,
             "foot_lock": not options.raw,
@@ -269,56 +269,56 @@ class Maker:
             "blend": options.loop,
             "person": row.whom,
             "timeline": timeline,
-            "goals": asked.goal,
+            "goals": order.goal,
         }
-        sampling: Any = self._sampling(asked, timeline and timeline.guidance)
+        sampling: Any = self._sampling(order, timeline and timeline.guidance)
         if task == "duet":
             sampling = PairSampling(**vars(sampling), pair_guidance=options.pair_guidance)
         return Plan(
             task=task,
-            values=build_request(REQUESTS[task], {name: value for name, value in said.items() if value is not None}),
+            values=build_request(REQUESTS[task], {name: value for name, value in values.items() if value is not None}),
             sampling=sampling,
-            seconds=asked.frames / self.prior.fps,
+            seconds=order.frames / self.prior.fps,
             timeline=timeline,
-            start=asked.start,
+            start=order.start,
             goals=goals,
         )
 
-    def _sampling(self, asked: Asked, guidance: float | None = None) -> Sampling:
+    def _sampling(self, order: Order, guidance: float | None = None) -> Sampling:
         """How a row is sampled; guidance: of its timeline."""
         options = self.options
         return Sampling(
             steps=options.steps,
             guidance=options.guidance if guidance is None else guidance,
             solver=options.solver,
-            seed=asked.seed,
-            best_of=asked.best_of,
-            batch_size=self.together if asked.timeline is None and asked.row.task != "duet" else None,
+            seed=order.seed,
+            best_of=order.best_of,
+            batch_size=self.together if order.timeline is None and order.row.task != "duet" else None,
         )
 
-    def _duet(self, asked: Asked) -> Made:
-        """Two people, one pair at a time: what is drawn beside it would change the last bits."""
-        texts = (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.words)
-        [made] = run(self._plan(asked), self.models)
-        duet = made.people[0], made.people[1]
+    def _duet(self, order: Order) -> Made:
+        """Two people, one pair at a time: what is sampled beside it would change the last bits."""
+        texts = (order.text, order.text) if order.timeline else prompts_of(order.row.words)
+        [result] = run(self._plan(order), self.models)
+        duet = result.people[0], result.people[1]
         measured = measure_two(duet, texts, self.judge)
-        if asked.goal is not None:
-            person = asked.row.whom
-            measured[person] |= _misses(evaluate(duet[person], duet[person], asked.goal))
-        return self._finished(asked, duet, measured)
+        if order.goal is not None:
+            person = order.row.whom
+            measured[person] |= _misses(evaluate(duet[person], duet[person], order.goal))
+        return self._finished(order, duet, measured)
 
-    def _measured(self, asked: Asked, motion: Motion, **measured: float) -> Made:
-        return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])
+    def _measured(self, order: Order, motion: Motion, **measured: float) -> Made:
+        return self._finished(order, [motion], [{**measure(motion, order.text, self.judge), **measured}])
 
-    def _finished(self, asked: Asked, people: Sequence[Motion], measured: Sequence[Values]) -> Made:
-        if asked.robot is not None:
+    def _finished(self, order: Order, people: Sequence[Motion], measured: Sequence[Values]) -> Made:
+        if order.robot is not None:
             if self.options.hands != "as-is":
                 raise MotionloomError("--hands poses fingers of a skeleton; leave it out with a robot")
-            found = [asked.robot.put(motion, self.options.fps) for motion in people]
-            measured = [{**own, **figures} for own, (_, figures, _) in zip(measured, found, strict=True)]
-            return Made(tuple(one for one, _, _ in found), tuple(measured), tuple(save for _, _, save in found))
-        if asked.target is not None:
-            people = [retarget(motion, asked.target, root=self.options.root) for motion in people]
+            clips = [order.robot.adapt(motion, self.options.fps) for motion in people]
+            measured = [{**own, **figures} for own, (_, figures, _) in zip(measured, clips, strict=True)]
+            return Made(tuple(one for one, _, _ in clips), tuple(measured), tuple(save for _, _, save in clips))
+        if order.target is not None:
+            people = [retarget(motion, order.target, root=self.options.root) for motion in people]
         people = [pose_hands(motion, self.options.hands) for motion in people]
         if self.options.fps is not None:
             people = [motion.resample(self.options.fps) for motion in people]

@@ -15,7 +15,7 @@ from motionloom.reading import read_table
 
 Values = Mapping[str, float | bool | None]
 Judge = Callable[[str, np.ndarray, float], bool | None]
-"""(prompt, positions (frames, 22, 3) metres, fps) to whether the motion does what the words say; None: nobody knows."""
+"""(prompt, positions (frames, 22, 3) metres, fps) to whether the motion does what the words say; None: unknown."""
 
 _TABLE = read_table("motionloom.bulk", "measures.toml")
 MEANING: dict[str, str] = _TABLE["motion"]
@@ -45,9 +45,9 @@ def measure(motion: Motion, prompt: str, judge: Judge | None = None) -> dict[str
         "speed": travel / motion.seconds,
         "turn": float(np.degrees(physics.turn(positions))),
     }
-    found: dict[str, float | bool | None] = {name: round(float(value), 4) for name, value in numbers.items()}
+    values: dict[str, float | bool | None] = {name: round(float(value), 4) for name, value in numbers.items()}
     unknown = dict.fromkeys(("error", "worst", "keeps", *SHARED))
-    return {**found, **unknown, "obeys": judge(prompt, positions, fps) if judge else None}
+    return {**values, **unknown, "obeys": judge(prompt, positions, fps) if judge else None}
 
 
 def measure_two(people: Sequence[Motion], prompts: Sequence[str], judge: Judge | None = None) -> list[dict[str, Any]]:
@@ -78,7 +78,7 @@ class Filter:
     """A condition on measures: comparisons, ``and``, ``or``, ``not``, ``+ - * /``, numbers and names of `MEANING`
     and `ROBOT`.
 
-    A measure that has no meaning for a motion makes what is said of it unknown, and unknown holds: ``obeys`` lets
+    A comparison with a measure that has no meaning for a motion is unknown, and unknown holds: ``obeys`` lets
     motions pass whose prompt no check knows.
     """
 
@@ -98,8 +98,8 @@ class Filter:
 
     def holds(self, values: Values) -> bool:
         """Whether the measures meet the condition; what is unknown does."""
-        found = self._value(values)
-        return True if found is None else bool(found)
+        value = self._value(values)
+        return True if value is None else bool(value)
 
 
 _COMPARE: dict[type, Callable[[Any, Any], bool]] = {
@@ -131,15 +131,15 @@ def _compiled(node: ast.expr, text: str, depth: int = 0) -> Callable[[Values], A
 
     match node:
         case ast.BoolOp(op=op, values=parts):
-            found = inside(*parts)
-            return lambda values: _all_or_any(isinstance(op, ast.Or), [part(values) for part in found])
+            functions = inside(*parts)
+            return lambda values: _all_or_any(isinstance(op, ast.Or), [part(values) for part in functions])
         case ast.UnaryOp(op=ast.Not() | ast.USub() as op, operand=part):
             return _of_known(operator.not_ if isinstance(op, ast.Not) else operator.neg, inside(part))
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _COUNT:
             return _of_known(_COUNT[type(op)], inside(left, right))
         case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARE for op in ops):
-            found = inside(left, *others)
-            return lambda values: _compared(ops, [part(values) for part in found])
+            functions = inside(left, *others)
+            return lambda values: _compared(ops, [part(values) for part in functions])
         case ast.Constant(value=bool() | int() | float() as value):
             return lambda values: value
         case ast.Name(id=name):
@@ -147,9 +147,9 @@ def _compiled(node: ast.expr, text: str, depth: int = 0) -> Callable[[Values], A
                 known = ", ".join((*MEANING, *ROBOT))
                 raise MotionloomError(f"the filter {text!r} asks for {name!r}; the measures are {known}")
             return lambda values: values.get(name)
-    said = (ast.get_source_segment(text.strip(), node) or "")[:40]
+    excerpt = (ast.get_source_segment(text.strip(), node) or "")[:40]
     raise MotionloomError(
-        f"the filter {text!r} holds {said!r}; it may hold comparisons of measures and numbers, and, or, not"
+        f"the filter {text!r} holds {excerpt!r}; it may hold comparisons of measures and numbers, and, or, not"
     )
 
 
@@ -157,21 +157,21 @@ def _of_known(function: Callable[..., Any], parts: Sequence[Callable[[Values], A
     """A function of parts, unknown where one of them is."""
 
     def value(values: Values) -> Any:
-        found = [part(values) for part in parts]
-        return None if None in found else function(*found)
+        numbers = [part(values) for part in parts]
+        return None if None in numbers else function(*numbers)
 
     return value
 
 
-def _all_or_any(decisive: bool, found: Sequence[Any]) -> bool | None:
+def _all_or_any(decisive: bool, values: Sequence[Any]) -> bool | None:
     """``or`` of values if ``decisive`` is True, else ``and``; None where unknown ones decide."""
-    if any(one is not None and bool(one) == decisive for one in found):
+    if any(one is not None and bool(one) == decisive for one in values):
         return decisive
-    return None if None in found else not decisive
+    return None if None in values else not decisive
 
 
-def _compared(ops: Sequence[ast.cmpop], found: Sequence[Any]) -> bool | None:
+def _compared(ops: Sequence[ast.cmpop], values: Sequence[Any]) -> bool | None:
     """A chain of comparisons; None where it holds for what is known and something is unknown."""
-    pairs = list(zip(found, ops, found[1:], strict=False))
+    pairs = list(zip(values, ops, values[1:], strict=False))
     known = [_COMPARE[type(op)](a, b) for a, op, b in pairs if a is not None and b is not None]
     return False if not all(known) else None if len(known) < len(pairs) else True

@@ -66,8 +66,8 @@ def table_shards(store: Store) -> int:
 def _about_table(store: Store) -> dict[str, Any]:
     """The table's hash by its name, and of how many shards it is; what is not known is left out."""
     try:
-        found = json.loads((store.out / RECORDS / ABOUT_TABLE).read_bytes())
-        return {str(found["file"]): str(found["sha256"]), "shards": int(found["shards"])}
+        about = json.loads((store.out / RECORDS / ABOUT_TABLE).read_bytes())
+        return {str(about["file"]): str(about["sha256"]), "shards": int(about["shards"])}
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return {}
 
@@ -86,7 +86,7 @@ def _all(store: Store, shards: int) -> Iterator[Entry]:
     for shard in range(shards):
         for entry in store.entries(shard):
             row = {**entry, "shard": shard}
-            if isinstance(row.get("error"), str):  # of a failed row; of a made one it is a measure
+            if isinstance(row.get("error"), str):  # of a failed row; else it is a measure
                 row["error_text"] = row.pop("error")
             yield row
 
@@ -116,7 +116,7 @@ class Result:
 
 
 def result(entry: Entry, people: tuple[Motion, ...] = ()) -> Result:
-    """What a record says of a row."""
+    """A row from its record."""
     own = ("row", "state", "id")
     failed = entry["state"] in ("failed", "repeated")
     about = {key: value for key, value in entry.items() if key not in own and not (failed and key == "error")}
@@ -136,46 +136,46 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
         if store.head(shard) is None:
             raise damaged_shard(store, shard)
         entries = list(store.entries(shard))
-        made = {e["id"]: e.get("people", 1) for e in entries if e["state"] == "made" and "robot" not in e}
-        read = _motions(store, shard, made) if motions else {}
-        yield from (result(entry, read.get(entry.get("id"), ())) for entry in entries)
+        counts = {e["id"]: e.get("people", 1) for e in entries if e["state"] == "made" and "robot" not in e}
+        loaded = _motions(store, shard, counts) if motions else {}
+        yield from (result(entry, loaded.get(entry.get("id"), ())) for entry in entries)
 
 
 People = tuple[Motion, ...]
 
 
-def _motions(store: Store, shard: int, made: dict[str, int]) -> dict[Any, People]:
+def _motions(store: Store, shard: int, counts: dict[str, int]) -> dict[Any, People]:
     """The motions of these ids, of which each has so many people."""
     place = store.data(shard)
     if store.kind == "webdataset":
-        return _from_tar(place, made) if place.exists() else {}
+        return _from_tar(place, counts) if place.exists() else {}
     if store.kind == "parquet":
         if not place.exists():
             return {}
         with parquet().ParquetFile(place) as file:
             return {row["id"]: _people(row) for part in file.iter_batches(batch_size=64) for row in part.to_pylist()}
     if store.kind == "glb":
-        return {name: tuple(load_scene(place / f"{name}.glb")) for name in made}
+        return {name: tuple(load_scene(place / f"{name}.glb")) for name in counts}
     return {
         name: tuple(load(place / file) for file in file_names(name, f".{store.kind}", people))
-        for name, people in made.items()
+        for name, people in counts.items()
     }
 
 
-def _from_tar(place: Path, made: Collection[str]) -> dict[Any, People]:
-    found: dict[str, People] = {}
+def _from_tar(place: Path, ids: Collection[str]) -> dict[Any, People]:
+    motions: dict[str, People] = {}
     try:
         with tarfile.open(place, "r:") as tar, tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
             for member in tar:
                 data, name = tar.extractfile(member), member.name.partition(".")[0]
-                if member.name.endswith(".npz") and data is not None and name in made:
+                if member.name.endswith(".npz") and data is not None and name in ids:
                     part = Path(folder) / "motion.npz"
                     part.write_bytes(data.read())
-                    found[name] = (*found.get(name, ()), load(part))
+                    motions[name] = (*motions.get(name, ()), load(part))
     except (tarfile.TarError, KeyError, OSError) as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{place} is damaged ({reason}); delete it and run the batch again") from None
-    return found
+    return motions
 
 
 def _people(row: dict[str, Any]) -> People:

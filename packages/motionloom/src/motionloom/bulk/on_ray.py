@@ -17,14 +17,14 @@ from dataclasses import asdict
 from itertools import chain
 from typing import Any
 
-from motionloom.bulk.crew import Again, Moved, search_path
+from motionloom.bulk.crew import ONE_THREAD, Again, Moved, search_path
 from motionloom.bulk.shard import Batch, Report, Task
 from motionloom.errors import MotionloomError
 
 PATIENCE = 1.0
 """Seconds between two looks at what is done."""
 LONELY = 120
-"""Looks without anybody who works, after which that is said."""
+"""Looks without anybody who works, after which there is a warning."""
 ANSWERS = 10.0
 """Seconds in which a cluster's head must answer."""
 
@@ -72,8 +72,8 @@ def on_ray(
             break
         yield item
     else:
-        return  # nothing is left to make, and no cluster needed
-    with redirect_stdout(sys.stderr):  # results go there, and Ray says there who died, whatever its settings
+        return  # nothing is left to generate, and no cluster needed
+    with redirect_stdout(sys.stderr):  # results go there, and Ray reports deaths there, whatever its settings
         ray = _start(address)
         try:
             yield from _Crew(ray, items, batch, workers, moved).run()
@@ -92,12 +92,11 @@ def _start(address: str | None) -> Any:
     address = address or os.environ.get("RAY_ADDRESS")
     if address is not None:
         _check_answers(address)
-    known = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-    known |= {"PYTHONPATH": search_path()} if address is None else {}
+    variables = ONE_THREAD | ({"PYTHONPATH": search_path()} if address is None else {})
     options: dict[str, Any] = {
         "log_to_driver": False,
         "logging_level": logging.CRITICAL,
-        "runtime_env": {"env_vars": known},
+        "runtime_env": {"env_vars": variables},
     }
     try:
         if address is None:
@@ -124,7 +123,7 @@ def _check_answers(address: str) -> None:
 
 
 def _shortened(error: Exception) -> str:
-    """What an error of Ray's says, in one line: how it begins, and how it ends, which is where a cause is named."""
+    """An error of Ray's in one line: how it begins, and how it ends, which is where a cause is named."""
     words = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
     return words if len(words) <= 300 else f"{words[:100]} ... {words[-200:]}"
 
@@ -135,9 +134,9 @@ class _Crew:
     ) -> None:
         self.ray, self.items, self.batch, self.moved = ray, items, batch, moved
         gpu = batch.options.device == "cuda"
-        found = ray.cluster_resources().get("GPU" if gpu else "CPU", 0)
-        self.workers = workers or max(int(found), 1)
-        share = 1 / max(-(-self.workers // max(int(found), 1)), 1) if gpu else 0  # several actors may share a GPU
+        units = ray.cluster_resources().get("GPU" if gpu else "CPU", 0)
+        self.workers = workers or max(int(units), 1)
+        share = 1 / max(-(-self.workers // max(int(units), 1)), 1) if gpu else 0  # several actors may share a GPU
         self.kind = ray.remote(num_cpus=1, num_gpus=share, max_restarts=0)(Hand)
         self.flight: dict[Any, tuple[Any, Task | None]] = {}
         """What is waited for: of which actor, and for which task (None: until it is ready)."""
@@ -156,9 +155,9 @@ class _Crew:
                 actor = self.idle.pop()
                 self.flight[actor.make.remote(task)] = actor, task
                 task = yield from self._next()
-            done, _ = self.ray.wait(list(self.flight), num_returns=1, timeout=PATIENCE)
-            self._waited(bool(done))
-            for reference in done:
+            ready, _ = self.ray.wait(list(self.flight), num_returns=1, timeout=PATIENCE)
+            self._waited(bool(ready))
+            for reference in ready:
                 if report := self._over(reference):
                     yield report
             if task is None:
@@ -181,7 +180,7 @@ class _Crew:
             self.flight[actor.ready.remote()] = actor, None
 
     def _waited(self, answered: bool) -> None:
-        """Say once that nobody comes, who would otherwise be waited for in silence: a cluster may still grow."""
+        """Warn once that no worker comes, which would otherwise be waited for in silence: a cluster may still grow."""
         working = answered or any(task for _, task in self.flight.values())
         self.looks = 0 if working else self.looks + 1
         if self.looks == LONELY:
@@ -205,7 +204,7 @@ class _Crew:
         self.stillborn = 0
         if task is None:
             return None
-        self.moved(answer["made"])
+        self.moved(answer["new_rows"])
         return Report(**answer)
 
     def _lost(self, task: Task | None, error: Exception) -> None:

@@ -34,7 +34,7 @@ class OnRobot:
         """Of its own that one of the uniform person's becomes: goals are in the robot's metres."""
         return self.robot.metre
 
-    def put(self, motion: Motion, fps: float | None) -> tuple[Motion, dict[str, Any], Save]:
+    def adapt(self, motion: Motion, fps: float | None) -> tuple[Motion, dict[str, Any], Save]:
         """What the robot does, as motion of its skeleton; its figures; and what writes its joint angles.
 
         motion: of any humanoid; fps: of the clip (None: 50). Raises `MotionloomError` where the motion is not a
@@ -45,9 +45,9 @@ class OnRobot:
         )
         figures = measure(clip, self.robot, max_speed=self.max_speed)
         own = ("frames", "fps", "fastest")  # the record has the first two anyway
-        found = {name: value for name, value in figures.as_dict().items() if name not in own}
+        measures = {name: value for name, value in figures.as_dict().items() if name not in own}
         moving = to_motion(self.robot, clip.qpos, clip.fps)
-        return moving, {**found, "faults": len(figures.faults())}, lambda path: save_clip(clip, self.robot, path)
+        return moving, {**measures, "faults": len(figures.faults())}, lambda path: save_clip(clip, self.robot, path)
 
     def determined(self) -> dict[str, Any]:
         """What of all this a clip depends on, as plain values."""

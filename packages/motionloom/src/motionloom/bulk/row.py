@@ -1,4 +1,4 @@
-"""What one row of a job asks for, and the id that follows from it."""
+"""The request of one row of a job, and the id that follows from it."""
 
 import hashlib
 import json
@@ -34,7 +34,7 @@ _ELSEWHERE = ("edit", "predict", "switch")
 MAX_DUET = 3600.0
 """Seconds of a timeline of two people."""
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
-_KEPT = 64
+CACHED = 64
 """Files named by rows, and as many prompts and goals, that are kept in memory."""
 
 
@@ -44,22 +44,22 @@ class Row(RowKeys):
 
     @property
     def words(self) -> str:
-        """The prompt; empty where there is a timeline, which says what happens."""
+        """The prompt; empty where there is a timeline, which has the words."""
         return self.prompt or ""
 
     @property
     def whom(self) -> int:
-        """Whose the goal is, or a timeline's path and goals: of two people the first (0) or the second (1)."""
+        """The person of the goal, or of a timeline's path and goals: the first (0) or the second (1)."""
         return (self.person or 1) - 1
 
     @property
     def names_files(self) -> bool:
-        """Whether what it asks also depends on what other files hold."""
+        """Whether its motion also depends on what other files hold."""
         return any(one is not None for one in (self.timeline, self.goal, self.skeleton, self.motion, self.robot))
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Order:
     """A row with everything that determines its motion."""
 
     row: Row
@@ -94,7 +94,7 @@ class Asked:
 
 
 class Unexpected(MotionloomError):
-    """A row that the program fails at, where a sentence should say what is wrong with the row."""
+    """A row that the program fails at, where the row should have been refused with a sentence."""
 
 
 def unexpected(error: Exception, what: str = "it cannot be read") -> Unexpected:
@@ -115,7 +115,7 @@ def explained(what: str = "it cannot be read") -> Iterator[None]:
 
 @explained()
 def parse(raw: bytes) -> Row:
-    """The row that the bytes of a JSON object ask for; raises `MotionloomError` for what cannot be."""
+    """The row in the bytes of a JSON object; raises `MotionloomError` for what cannot be."""
     row = _columns(raw)
     goal = _goal(row.get("goal"))
     if row.get("task") in _ELSEWHERE:
@@ -168,22 +168,22 @@ def _goal(goal: Any) -> str | dict[str, Any] | None:
         raise MotionloomError(f"'goal' is no JSON ({error})") from None
 
 
-def _task(given: str | None, goal: bool, timeline: bool, motion: bool) -> str:
-    meant = "duet" if given == "duet" else "compose" if timeline else "control" if goal else "generate"
-    if motion and (goal or timeline or given not in (None, "export")):
+def _task(task: str | None, goal: bool, timeline: bool, motion: bool) -> str:
+    kind = "duet" if task == "duet" else "compose" if timeline else "control" if goal else "generate"
+    if motion and (goal or timeline or task not in (None, "export")):
         raise MotionloomError("a row with a motion is of the task export, without a goal and a timeline")
-    meant = "export" if motion else meant
+    kind = "export" if motion else kind
     if goal and timeline:
         raise MotionloomError("the row has a goal and a timeline; write the goal into the timeline")
-    if given is not None and given != meant:
+    if task is not None and task != kind:
         needs = {
             "compose": "a timeline",
             "control": "a goal",
             "generate": "neither goal nor timeline",
             "export": "a motion",
         }
-        raise MotionloomError(f"the task {given} needs {needs[given]}, and the row asks for {meant}")
-    return meant
+        raise MotionloomError(f"the task {task} needs {needs[task]}, and the row asks for {kind}")
+    return kind
 
 
 def _check_words(task: str, words: str) -> None:
@@ -208,7 +208,7 @@ class Sources:
     fps: float = FPS
     """Of the weights."""
     seconds: float = 5.0
-    """This and what follows is of rows that do not say."""
+    """This and what follows is of rows without it."""
     seed: int = 0
     skeleton: str | None = None
     """May lie anywhere."""
@@ -222,10 +222,10 @@ class Sources:
 
     def __post_init__(self) -> None:
         self._common = json.dumps({**self.common, "format": FORMAT}, sort_keys=True)
-        self._cache, self._written = _Kept(), _Kept()
+        self._files, self._texts = _Cache(), _Cache()
 
     @explained()
-    def ask(self, row: Row) -> Asked:
+    def ask(self, row: Row) -> Order:
         """The row with the files it names; raises `MotionloomError` for what is wrong in them."""
         timeline = start = clip = None
         goal: tuple[Goal | None, str | None] = (None, None)
@@ -247,7 +247,7 @@ class Sources:
         if row.goal is not None:
             goal = self._goal(row.goal, frames, metre)
         target = self._target(row, robot)
-        said = {
+        facts = {
             "common": self._common,
             "task": row.task,
             "prompt": row.words,
@@ -257,15 +257,15 @@ class Sources:
             "timeline": digest,
             "skeleton": target and digest_skeleton(target),
         }
-        said |= {} if clip is None else {"motion": hash_file(clip)}  # left out as they always were: old ids hold
-        said |= {} if robot is None else {"robot": robot.determined()}
+        facts |= {} if clip is None else {"motion": hash_file(clip)}  # left out as they always were: old ids hold
+        facts |= {} if robot is None else {"robot": robot.determined()}
         best_of = 1 if clip is not None else self.best_of if row.best_of is None else row.best_of
         if best_of > 1:
-            said["best_of"] = best_of
+            facts["best_of"] = best_of
         if row.task == "duet":
-            said |= {"pair": dict(self.pair), "person": row.whom + 1}
-        key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-        return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of, clip, robot)
+            facts |= {"pair": dict(self.pair), "person": row.whom + 1}
+        key = hashlib.sha256(json.dumps(facts, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
+        return Order(row, key, frames, seed, goal[0], timeline, start, target, best_of, clip, robot)
 
     def _target(self, row: Row, robot: OnRobot | None) -> Skeleton | None:
         """What the motion is put on: the row's skeleton or, without that and a robot, the job's."""
@@ -278,7 +278,7 @@ class Sources:
     def _worded(self, row: Row, metre: float) -> tuple[Timeline | None, str | None]:
         """The row's prompt as a timeline, where numbers in it are kept, and its hash.
 
-        It is as long as the numbers need where no time is said. Many rows have the same words: they are read once.
+        It is as long as the numbers need where no time is given. Many rows have the same words: they are read once.
         """
         if row.task != "generate" or self.literal or self.fps != FPS or not row.words.strip():
             return None, None
@@ -286,33 +286,33 @@ class Sources:
             return None, None
         words = (row.words, row.seconds, metre)
 
-        def written() -> tuple[Timeline | None, str | None]:
-            found = timeline_of(row.words, row.seconds, amounts=True, metre=metre)
-            return (found, digest_timeline(found, None)) if found.readings else (None, None)
+        def read_words() -> tuple[Timeline | None, str | None]:
+            timeline = timeline_of(row.words, row.seconds, amounts=True, metre=metre)
+            return (timeline, digest_timeline(timeline, None)) if timeline.readings else (None, None)
 
-        return self._written.of(words, written)
+        return self._texts.of(words, read_words)
 
     def _goal(self, goal: str | dict[str, Any], frames: int, metre: float) -> tuple[Goal, str]:
         """A goal and its hash; rows with the same goal share it."""
 
         def read(source: Any, folder: Path) -> tuple[Goal, str]:
-            found = read_goal(source, frames=frames, folder=folder, metre=metre)
-            return found, digest_goal(found)
+            parsed = read_goal(source, frames=frames, folder=folder, metre=metre)
+            return parsed, digest_goal(parsed)
 
         if isinstance(goal, str):
             return self._read("goal", goal, lambda path: read(path, path.parent), frames, metre)
-        return self._written.of((json.dumps(goal), frames, metre), lambda: read(goal, self.folder))
+        return self._texts.of((json.dumps(goal), frames, metre), lambda: read(goal, self.folder))
 
     def _robot(self, row: Row) -> OnRobot | None:
-        """The robot that the row's motion is put on; what it does not say is as the job says."""
+        """The robot that the row's motion is put on; what the row leaves out is the job's."""
         own = {"max_speed": row.max_speed, "avoid_collisions": row.avoid_collisions}
-        said = {**self.limits, **{name: value for name, value in own.items() if value is not None}}
+        limits = {**self.limits, **{name: value for name, value in own.items() if value is not None}}
         if row.robot is None:
             if row.robot_map is not None or (self.robot is None and any(one is not None for one in own.values())):
                 raise MotionloomError("columns about a robot go with a 'robot' of the row; name its model")
-            return None if self.robot is None or row.skeleton is not None else replace(self.robot, **said)
+            return None if self.robot is None or row.skeleton is not None else replace(self.robot, **limits)
         mapped = None if row.robot_map is None else Field(row.robot_map, "robot_map").file(self.folder)
-        return replace(self._read("robot", row.robot, lambda path: on_robot(path, mapped), str(mapped)), **said)
+        return replace(self._read("robot", row.robot, lambda path: on_robot(path, mapped), str(mapped)), **limits)
 
     def _skeleton(self, name: str, field: Field | None) -> Skeleton | None:
         if name.lower() == "smpl22":
@@ -326,20 +326,20 @@ class Sources:
     def _cached(self, column: str, path: Path, read: Callable[[Path], Any], *more: Any) -> Any:
         about = path.stat()
         key = (column, str(path), about.st_size, about.st_mtime_ns, *more)
-        return self._cache.of(key, lambda: read(path))
+        return self._files.of(key, lambda: read(path))
 
 
-class _Kept(OrderedDict[Any, tuple[Any, MotionloomError | None]]):
-    """The values that were asked for last, by what they are made of; what was refused is refused again unread."""
+class _Cache(OrderedDict[Any, tuple[Any, MotionloomError | None]]):
+    """The values of the last requests, by their sources; what was refused is refused again unread."""
 
     def of(self, key: Any, make: Callable[[], Any]) -> Any:
-        """The value of a key, made where it is not kept; raises what ``make`` raises."""
+        """The value of a key, computed where it is not kept; raises what ``make`` raises."""
         if key not in self:
             try:
                 self[key] = make(), None
             except MotionloomError as error:
                 self[key] = None, error
-            if len(self) > _KEPT:
+            if len(self) > CACHED:
                 self.popitem(last=False)
         self.move_to_end(key)
         value, error = self[key]
@@ -349,7 +349,7 @@ class _Kept(OrderedDict[Any, tuple[Any, MotionloomError | None]]):
 
 
 def _check_timeline(task: str, timeline: Timeline) -> None:
-    """Refuse before anything is drawn what two people, or one, cannot do."""
+    """Refuse before anything is sampled what two people, or one, cannot do."""
     for segment in timeline.segments:
         _check_words(task, segment.text)
     if task != "duet":
@@ -395,14 +395,14 @@ def hash_adapters(adapters: Sequence[tuple[Path, float]]) -> list[str]:
 
 
 def digest_goal(goal: Goal) -> str:
-    """Hash of what a goal asks; what is not asked does not count."""
+    """Hash of what a goal constrains; what is free does not count."""
     where = np.where(goal.mask, goal.positions, 0.0)
     facing = np.where(goal.facing_mask, goal.facing, 0.0)
     return _digest(where, goal.mask, facing, goal.facing_mask, None if goal.start is None else astuple(goal.start))
 
 
 def digest_timeline(timeline: Timeline, start: Motion | None) -> str:
-    """Hash of what a timeline asks, the motion it goes on from included."""
+    """Hash of a timeline, the motion it goes on from included."""
     segments = [
         (
             *(s.text, s.seconds, s.guidance, s.transition, None if s.goal is None else digest_goal(s.goal)),

@@ -29,7 +29,7 @@ class Verified:
 
 
 def verify(out: Path | str) -> Verified:
-    """Compare all files of a batch with what its records say of them; nothing is changed.
+    """Compare all files of a batch with its records; nothing is changed.
 
     Raises `MotionloomError` for a folder that is no batch, whose manifest is damaged, or in which somebody works.
     """

@@ -1,4 +1,4 @@
-"""One process of `motionloom.bulk.crew`: reads tasks as JSON lines and says on its output what became of them.
+"""One process of `motionloom.bulk.crew`: reads tasks as JSON lines and reports on its output what became of them.
 
 Started as ``python -m motionloom.bulk.worker``. It ends when its input does, and so never outlives who started it.
 """
@@ -17,16 +17,16 @@ from motionloom.errors import MotionloomError
 
 
 def main() -> int:
-    """Make shards until the input ends."""
+    """Generate shards until the input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it
-    said = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    output = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what libraries print is no message
     lines: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_listen, args=(lines,), daemon=True).start()
 
     def say(message: dict[str, Any]) -> None:
-        said.write(json.dumps(message) + "\n")
-        said.flush()
+        output.write(json.dumps(message) + "\n")
+        output.flush()
 
     warnings.showwarning = lambda message, *_: say({"warning": " ".join(str(message).split())})  # type: ignore[assignment]
     try:
@@ -56,8 +56,8 @@ def _work(lines: "queue.Queue[str]", say: Any) -> None:
     maker = batch.maker()
     say({"ready": True})
     while True:
-        asked = json.loads(lines.get())
-        task = Task(asked["shard"], asked["first"], [row.encode("latin-1") for row in asked["rows"]])
+        message = json.loads(lines.get())
+        task = Task(message["shard"], message["first"], [row.encode("latin-1") for row in message["rows"]])
         report = make_shard(task, batch, maker, lambda rows: say({"moved": rows}))
         say({"report": asdict(report)})
 

@@ -1,6 +1,6 @@
 """One shard's motions as files: a folder of single files, a tar as webdataset reads it, or a Parquet file.
 
-Each writer makes one new thing at the path it is given, and takes over motions from an older one of its kind.
+Each writer creates one new thing at the path it is given, and takes over motions from an older one of its kind.
 """
 
 import io
@@ -40,7 +40,7 @@ class Writer(ABC):
         self.path = path
 
     @abstractmethod
-    def add(self, made: Made, about: dict[str, Any]) -> None:
+    def add(self, take: Made, about: dict[str, Any]) -> None:
         """One motion; ``about`` has its ``id`` and what is to be known of it. Of a robot its joint angles are kept."""
 
     @abstractmethod
@@ -60,24 +60,24 @@ class Files(Writer):
         self.kind, self.unit = suffix, unit
         path.mkdir()
 
-    def add(self, made: Made, about: dict[str, Any]) -> None:
-        places = [self.path / name for name in file_names(about["id"], self.kind, len(made.people))]
+    def add(self, take: Made, about: dict[str, Any]) -> None:
+        places = [self.path / name for name in file_names(about["id"], self.kind, len(take.people))]
         try:
-            self._save(made, places)
+            self._save(take, places)
         except BaseException:
             for place in places:  # all that there is of a motion, or none
                 place.unlink(missing_ok=True)
             raise
 
-    def _save(self, made: Made, places: Sequence[Path]) -> None:
-        for write, place in zip(made.angles, places):
+    def _save(self, take: Made, places: Sequence[Path]) -> None:
+        for write, place in zip(take.angles, places):
             write(place)
-        if made.angles:
+        if take.angles:
             return
-        if len(places) < len(made.people):
-            save_scene(made.people, places[0], names=PEOPLE)
+        if len(places) < len(take.people):
+            save_scene(take.people, places[0], names=PEOPLE)
             return
-        for motion, place in zip(made.people, places, strict=True):
+        for motion, place in zip(take.people, places, strict=True):
             if self.kind == ".bvh":
                 save_bvh(motion, place, unit=self.unit)
             else:
@@ -103,28 +103,28 @@ class Tar(Writer):
         self._tar = tarfile.open(path, "w", format=tarfile.USTAR_FORMAT)  # noqa: SIM115
         self._part = path.with_name(f"{path.name}.npz")
 
-    def add(self, made: Made, about: dict[str, Any]) -> None:
-        found = {}
-        writes = made.angles or [partial(save_npz, motion) for motion in made.people]
-        for write, name in zip(writes, file_names(about["id"], ".npz", len(made.people)), strict=True):
+    def add(self, take: Made, about: dict[str, Any]) -> None:
+        files = {}
+        writes = take.angles or [partial(save_npz, motion) for motion in take.people]
+        for write, name in zip(writes, file_names(about["id"], ".npz", len(take.people)), strict=True):
             write(self._part)
-            found[name] = self._part.read_bytes()
-        found[f"{about['id']}.json"] = json_line(dict(sorted(about.items())))
-        for name, data in found.items():  # all that there is of a motion, or none
-            self._put(name, data)
+            files[name] = self._part.read_bytes()
+        files[f"{about['id']}.json"] = json_line(dict(sorted(about.items())))
+        for name, data in files.items():  # all that there is of a motion, or none
+            self._add_file(name, data)
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
         with tarfile.open(old) as tar:
             for member in tar:
                 data = tar.extractfile(member)
                 if data is not None and member.name.partition(".")[0] in ids:
-                    self._put(member.name, data.read())
+                    self._add_file(member.name, data.read())
 
     def close(self) -> None:
         self._tar.close()
         self._part.unlink(missing_ok=True)
 
-    def _put(self, name: str, data: bytes) -> None:
+    def _add_file(self, name: str, data: bytes) -> None:
         member = tarfile.TarInfo(name)
         member.size = len(data)
         self._tar.addfile(member, io.BytesIO(data))
@@ -140,8 +140,8 @@ class Parquet(Writer):
         self._rows: list[dict[str, Any]] = []
         self._file = parquet().ParquetWriter(path, parquet_schema(), compression="zstd")
 
-    def add(self, made: Made, about: dict[str, Any]) -> None:
-        self._rows.append(parquet_row(made.people, about))
+    def add(self, take: Made, about: dict[str, Any]) -> None:
+        self._rows.append(parquet_row(take.people, about))
         if len(self._rows) == ROWS:
             self._flush()
 
@@ -150,9 +150,9 @@ class Parquet(Writer):
         chosen = arrow().array(sorted(ids))
         with parquet().ParquetFile(old) as file:
             for part in file.iter_batches(batch_size=ROWS):
-                kept = part.filter(within(part["id"], value_set=chosen))
-                if len(kept):
-                    self._file.write_batch(kept)
+                rows = part.filter(within(part["id"], value_set=chosen))
+                if len(rows):
+                    self._file.write_batch(rows)
 
     def close(self) -> None:
         self._flush()
@@ -246,14 +246,14 @@ def sizes(path: Path) -> dict[str, int]:
 
 def hashes(path: Path) -> dict[str, str]:
     """SHA-256 of a shard's files by their names; of a shard that is one file, that one's. Empty: it cannot be read."""
-    found = {}
+    digests = {}
     for place in sorted(_files(path)):
         name = place.name if place != path else ""
         try:
-            found[name] = hash_file(place)
+            digests[name] = hash_file(place)
         except OSError:
-            found[name] = ""
-    return found
+            digests[name] = ""
+    return digests
 
 
 def sync(path: Path) -> None:

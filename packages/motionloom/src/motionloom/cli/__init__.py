@@ -27,10 +27,10 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[override]
         """What a command does not know is its own mistake, not the whole program's: its --help is the one to read."""
-        found, unknown = super().parse_known_args(None if args is None else with_options(self, args), namespace)
+        arguments, unknown = super().parse_known_args(None if args is None else with_options(self, args), namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(self, unknown)}")
-        return found, unknown
+        return arguments, unknown
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -50,7 +50,7 @@ def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPars
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted (also by SIGTERM, SIGHUP)."""
+    """Run one command; 0 done, 2 a mistake in the line or a file, 130 interrupted (also by SIGTERM, SIGHUP)."""
     try:  # from here on: a Ctrl-C while the commands are still being imported is one too
         with interruptible(), escaping():
             return _run_and_report(argv)
@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command, and say in one line why it ended if it did not end well."""
+    """Run one command, and report in one line why it ended if it did not end well."""
     code = 2
     try:
         return _run(argv)

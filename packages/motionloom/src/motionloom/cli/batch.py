@@ -21,7 +21,7 @@ from motionloom.cli.writing import fail
 from motionloom.runtime import set_threads
 
 JUDGE = "motionloom_lab.metrics.obedience:obeys"
-SHOWN = 10
+LISTED = 10
 """Failed rows listed at the end; the records list all."""
 PAUSE = 10.0
 """Seconds between two lines of progress where there is no terminal."""
@@ -34,7 +34,6 @@ def run_batch(arguments: Namespace) -> int:
 
     ``--verify FOLDER``: 2 where something is damaged.
     """
-
     if arguments.verify is not None:
         return _verify(arguments)
     if arguments.out is None:
@@ -57,18 +56,18 @@ def _verify(arguments: Namespace) -> int:
 
     if any(one is not None for one in (arguments.jobs, arguments.prompts, arguments.recordings, arguments.out)):
         fail("--verify FOLDER looks at a batch and makes nothing; give it without jobs and --out")
-    found = verify(arguments.verify)
+    report = verify(arguments.verify)
     if arguments.json:
-        print(json.dumps(vars(found) | {"damaged": [str(path) for path in found.damaged]}, indent=1))
+        print(json.dumps(vars(report) | {"damaged": [str(path) for path in report.damaged]}, indent=1))
     else:
-        for path in found.damaged:
+        for path in report.damaged:
             print(f"{path} is {'not as it was written' if path.exists() else 'lost'}")
-        if not found.damaged:
-            print(f"{arguments.verify} is as it was written: {found.shards:,} of {found.of:,} shards")
-        if found.sizes_only:
-            print(f"of {found.sizes_only:,} older shards there are no hashes, and only sizes were compared")
-    if found.damaged:
-        count = len(found.damaged)
+        if not report.damaged:
+            print(f"{arguments.verify} is as it was written: {report.shards:,} of {report.of:,} shards")
+        if report.sizes_only:
+            print(f"of {report.sizes_only:,} older shards there are no hashes, and only sizes were compared")
+    if report.damaged:
+        count = len(report.damaged)
         fail(
             f"{count:,} {'file' if count == 1 else 'files'} of {arguments.verify} {'is' if count == 1 else 'are'} "
             "damaged; run the command that made the batch again: it generates the damaged files again, and no others"
@@ -77,9 +76,8 @@ def _verify(arguments: Namespace) -> int:
 
 
 def _jobs(arguments: Namespace) -> Jobs:
-
-    given = [one for one in (arguments.jobs, arguments.prompts, arguments.recordings) if one is not None]
-    if len(given) != 1:
+    sources = [one for one in (arguments.jobs, arguments.prompts, arguments.recordings) if one is not None]
+    if len(sources) != 1:
         fail("give one of a file of jobs, --prompts with a file of prompts, and --recordings with a folder of motions")
     if arguments.recordings is not None:
         return Jobs.of_recordings(arguments.recordings)
@@ -91,7 +89,6 @@ def _jobs(arguments: Namespace) -> Jobs:
 
 
 def _options(arguments: Namespace) -> Options:
-
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     if obeys:
         import_module(JUDGE.partition(":")[0])  # before any work: without the laboratory nobody judges
@@ -107,7 +104,6 @@ def _options(arguments: Namespace) -> Options:
 
 
 def _where(arguments: Namespace) -> Where:
-
     if arguments.workers is not None and not 1 <= arguments.workers <= 10_000:
         fail(f"--workers must be 1 to 10000; got {arguments.workers}")
     if arguments.ray is not None:
@@ -123,56 +119,54 @@ def _where(arguments: Namespace) -> Where:
 
 
 def _estimate(arguments: Namespace, jobs: Jobs, options: Options, where: Where) -> None:
-
     set_threads(1)
-    found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
+    cost = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
     if arguments.json:
-        about = vars(found) | {"hours": found.hours, "gigabytes": found.gigabytes}
+        about = vars(cost) | {"hours": cost.hours, "gigabytes": cost.gigabytes}
         print(json.dumps(about, indent=1))
         return
     on = "processes" if options.device == "cuda" else "cores"
     print(
-        f"{found.rows:,} motions: {_time(found.hours * 3600)} on {found.workers} {on}, {found.gigabytes:.3g} GB "
-        f"({found.seconds_each:.2f} s and {found.bytes_each / 1000:.0f} kB each, by {found.sampled} of the rows)"
+        f"{cost.rows:,} motions: {_time(cost.hours * 3600)} on {cost.workers} {on}, {cost.gigabytes:.3g} GB "
+        f"({cost.seconds_each:.2f} s and {cost.bytes_each / 1000:.0f} kB each, by {cost.sampled} of the rows)"
     )
-    if found.usable < 1:
-        print(f"{found.usable:.0%} of the rows looked at would be kept")
+    if cost.usable < 1:
+        print(f"{cost.usable:.0%} of the rows looked at would be kept")
 
 
 def _make(arguments: Namespace, jobs: Jobs, options: Options, *, where: Where, rows: int) -> int:
-
     counts: Counter[str] = Counter()
     problems: list[str] = []
-    made = 0
+    attempts = 0
     with _Progress(rows if where.shard is None else -(-rows // where.shard[1])) as progress:
         reports = run(
             jobs, arguments.out, options=options, where=where, moved=progress.moved, rows=rows, force=arguments.force
         )
         for report in reports:
             counts.update(report.counts)
-            made += report.made
-            problems += report.problems[: SHOWN - len(problems)]
-            progress.done(report)
+            attempts += report.new_rows
+            problems += report.problems[: LISTED - len(problems)]
+            progress.finish_shard(report)
     for problem in problems:
         say(problem)
     if arguments.json:
-        print(json.dumps({"folder": str(arguments.out), "tried": made, **counts}, indent=1))
+        print(json.dumps({"folder": str(arguments.out), "tried": attempts, **counts}, indent=1))
     else:
-        _say(arguments.out, counts, made)
+        _say(arguments.out, counts, attempts)
     return 1 if counts["failed"] else 0
 
 
-def _say(out: Path, counts: dict[str, int], made: int) -> None:
-    said = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
+def _say(out: Path, counts: dict[str, int], attempts: int) -> None:
+    phrases = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
     if counts["dropped"]:
-        said.append(f"{counts['dropped']:,} were dropped by the filter")
+        phrases.append(f"{counts['dropped']:,} were dropped by the filter")
     if counts["repeated"]:
-        said.append(f"{counts['repeated']:,} {'row repeats' if counts['repeated'] == 1 else 'rows repeat'} another")
+        phrases.append(f"{counts['repeated']:,} {'row repeats' if counts['repeated'] == 1 else 'rows repeat'} another")
     if counts["failed"]:
-        said.append(
+        phrases.append(
             f"{counts['failed']:,} failed (rows are counted from 0; correct them and run the same command again)"
         )
-    print(("nothing was left to make: " if counts["made"] and not made else "") + ", ".join(said))
+    print(("nothing was left to make: " if counts["made"] and not attempts else "") + ", ".join(phrases))
 
 
 class _Progress:
@@ -182,46 +176,46 @@ class _Progress:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-        self.rows, self.there, self.made, self.clock = rows, 0, 0, time.monotonic
+        self.rows, self.there, self.count, self.clock = rows, 0, 0, time.monotonic
         self.began = self.reported = self.clock()
-        self.since = 0  # rows made before the clock of the rate began: a worker first loads its weights
+        self.since = 0  # rows of before the clock of the rate began: a worker first loads its weights
         screen = Console(file=unescaped(sys.stderr))
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
         self.bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
         self.quiet = not screen.is_terminal
         self.task = self.bar.add_task("batch", total=rows, rate="")
-        self.shown = ExitStack()
+        self.stack = ExitStack()
 
     def __enter__(self) -> "_Progress":
-        self.shown.enter_context(self.bar)
-        self.shown.enter_context(escaping())  # the bar has put streams of its own in between
+        self.stack.enter_context(self.bar)
+        self.stack.enter_context(escaping())  # the bar has streams of its own in between
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.shown.close()
+        self.stack.close()
 
     def moved(self, rows: int) -> None:
-        """So many rows more were made."""
-        if not self.made:
+        """Count so many rows more."""
+        if not self.count:
             self.began, self.since = self.clock(), rows
-        self.made += rows
+        self.count += rows
         self._show()
 
-    def done(self, report: Report) -> None:
-        """A shard is whole; its rows that were not made now were there before."""
-        self.there += report.rows - report.made
+    def finish_shard(self, report: Report) -> None:
+        """A shard is whole; its rows that are not new were there before."""
+        self.there += report.rows - report.new_rows
         self._show()
 
     def _show(self) -> None:
         now = self.clock()
-        known = now - self.began > SHORTEST and self.made > self.since
-        rate = (self.made - self.since) / (now - self.began) if known else 0.0
-        done = min(self.there + self.made, self.rows)
-        self.bar.update(self.task, completed=done, rate=f"{60 * rate:.0f} a minute" if known else "")
+        known = now - self.began > SHORTEST and self.count > self.since
+        rate = (self.count - self.since) / (now - self.began) if known else 0.0
+        rows = min(self.there + self.count, self.rows)
+        self.bar.update(self.task, completed=rows, rate=f"{60 * rate:.0f} a minute" if known else "")
         if self.quiet and now - self.reported > PAUSE and known:
             self.reported = now
-            left = _time((self.rows - done) / rate)
-            print(f"{done:,} of {self.rows:,} rows, {60 * rate:.0f} a minute, {left} left", file=sys.stderr)
+            left = _time((self.rows - rows) / rate)
+            print(f"{rows:,} of {self.rows:,} rows, {60 * rate:.0f} a minute, {left} left", file=sys.stderr)
 
 
 def _time(seconds: float) -> str:

@@ -63,11 +63,11 @@ def _registered(name: str) -> Add:
 
 
 def _installed(name: str) -> Iterator[Add]:
-    """What registers a command, as the entry points of installed packages say."""
+    """What registers a command, by the entry points of installed packages."""
     from importlib.metadata import entry_points
 
-    for found in entry_points(group=GROUP, name=name):
-        yield found.load()
+    for entry in entry_points(group=GROUP, name=name):
+        yield entry.load()
 
 
 def absence(error: ModuleNotFoundError) -> str | None:

@@ -35,10 +35,10 @@ def script(shell: str, commands: "dict[str, argparse.ArgumentParser]") -> str:
     }
     if shell == "fish":
         lines = [f"complete -c motionloom -n __fish_use_subcommand -f -a '{' '.join(commands)}'"]
-        for name, found in options.items():
-            seen = f"'__fish_seen_subcommand_from {name}'"
-            lines += [f"complete -c motionloom -n {seen} -l {option[2:]}" for option in found]
+        for name, words in options.items():
+            test = f"'__fish_seen_subcommand_from {name}'"
+            lines += [f"complete -c motionloom -n {test} -l {option[2:]}" for option in words]
         return "\n".join(lines) + "\n"
-    cases = "\n".join(f'            {name}) words="{" ".join(found)}" ;;' for name, found in options.items())
+    cases = "\n".join(f'            {name}) words="{" ".join(words)}" ;;' for name, words in options.items())
     bash = _BASH.format(commands=" ".join(commands), cases=cases)
     return "autoload -U +X bashcompinit && bashcompinit\n" + bash if shell == "zsh" else bash

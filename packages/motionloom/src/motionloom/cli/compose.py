@@ -38,7 +38,7 @@ from motionloom.weights.prior import Prior
 
 REMARKED = 200
 """Segments whose texts are looked up among what the weights know."""
-SHOWN = 40
+LISTED = 40
 """Segments listed at the end; --json lists all."""
 
 
@@ -58,10 +58,10 @@ def run_compose(arguments: Namespace) -> int:
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
     timeline = replace(timeline, segments=load_segment_adapters(prior, timeline.segments))
     streams = _open(arguments, outs, timeline, target)
-    shown: list[Motion] = []
-    interrupted = _make(arguments, prior, timeline, streams, shown)
+    record: list[Motion] = []
+    interrupted = _make(arguments, prior, timeline, streams, record)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
-    did = happened([concatenate(*shown)] if shown else [])
+    did = happened([concatenate(*record)] if record else [])
     _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks, happened=did)
     if interrupted:
         say(f"interrupted; {_finished_files(streams)} of {timeline.seconds:.2f} s")
@@ -70,16 +70,16 @@ def run_compose(arguments: Namespace) -> int:
 
 
 def _timeline(arguments: Namespace, metre: float) -> Timeline:
-    """What is asked, whether in a file or on the command line. metre: as of `Target.metre`."""
+    """The timeline of a file or of the command line. metre: as of `Target.metre`."""
     from motionloom.goals import timeline
 
-    given: list[str] = arguments.segments
-    files = [word for word in given if word.lower().endswith((".yaml", ".yml"))]
+    words: list[str] = arguments.segments
+    files = [word for word in words if word.lower().endswith((".yaml", ".yml"))]
     if not files:
         seconds = timeline.SECONDS if arguments.seconds is None else arguments.seconds
-        return timeline.plain_timeline(given, seconds=seconds, transition=arguments.transition)
-    if len(given) > 1:
-        fail(f"give either one timeline file or prompts; got {files[0]} and {len(given) - 1} more")
+        return timeline.plain_timeline(words, seconds=seconds, transition=arguments.transition)
+    if len(words) > 1:
+        fail(f"give either one timeline file or prompts; got {files[0]} and {len(words) - 1} more")
     if arguments.seconds is not None or arguments.transition is not None:
         fail(f"--seconds and --transition go with prompts; write them into {files[0]}")
     return timeline.read_timeline(files[0], metre)
@@ -89,8 +89,8 @@ def _open(arguments: Namespace, outs: Sequence[Path], timeline: Timeline, target
     """The files, those that grow on the disk last: they are closed first, and that is quick."""
     rate = arguments.fps or 20.0
     total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
-    said = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
-    streams = [target.open(out, total=total, fps=rate, caption=said) for out in outs]
+    caption = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
+    streams = [target.open(out, total=total, fps=rate, caption=caption) for out in outs]
     return sorted(streams, key=lambda stream: target.skeleton is None and stream.path.suffix.lower() == ".bvh")
 
 
@@ -99,17 +99,17 @@ def _make(
     prior: Prior,
     timeline: Timeline,
     streams: Sequence[Stream],
-    shown: list[Motion],
+    record: list[Motion],
 ) -> bool:
     """Write the motion; true if it was interrupted after something was finished.
 
-    ``shown`` gets its pieces where what happened is reported: of a motion that is not too long for that.
+    ``record`` gets its pieces where what happened is reported: of a motion that is not too long for that.
     """
     described = arguments.json and timeline.seconds <= LONGEST
 
     try:
-        with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is said
-            pieces = _kept_in(shown, pieces) if described else pieces
+        with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is printed
+            pieces = _recorded(record, pieces) if described else pieces
             write_pieces(pieces if arguments.fps is None else resampled(pieces, arguments.fps), streams)
     except KeyboardInterrupt:
         if not _saved(streams):
@@ -124,14 +124,13 @@ def _make(
     return False
 
 
-def _kept_in(shown: list[Motion], pieces: Iterable[Motion]) -> Generator[Motion, None, None]:
+def _recorded(record: list[Motion], pieces: Iterable[Motion]) -> Generator[Motion, None, None]:
     for piece in pieces:
         yield piece
-        shown.append(piece)
+        record.append(piece)
 
 
 def _pieces(arguments: Namespace, prior: Prior, timeline: Timeline) -> Generator[Motion, None, None]:
-
     values = request_of(arguments, Compose, {"timeline": timeline})
     plan = Plan(
         task="compose",
@@ -162,7 +161,7 @@ def _report(
     remarks: Sequence[str] = (),
     happened: Sequence[Any] = (),
 ) -> None:
-    """Print what was made and where each segment lies in it, as far as it was made."""
+    """Print the files and where each segment is in the motion, as far as that was generated."""
     rows = [row | {"end": min(row["end"], seconds)} for row in segment_rows(timeline) if row["begin"] < seconds]
     if arguments.json:
         files = [str(stream.path) for stream in streams]
@@ -175,10 +174,10 @@ def _report(
         print(f"wrote {stream.path}: {seconds:.2f} s{frames}")
     if not streams:
         print(f"{len(rows):,} segments, {seconds:.2f} s in all; nothing was made")
-    for row in rows[:SHOWN]:
+    for row in rows[:LISTED]:
         print(f"{row['begin']:9.2f}  {_shortened(row['text'])}")
-    if len(rows) > SHOWN:
-        print(f"           ... and {len(rows) - SHOWN:,} more; --json lists all")
+    if len(rows) > LISTED:
+        print(f"           ... and {len(rows) - LISTED:,} more; --json lists all")
 
 
 def _shortened(text: str) -> str:

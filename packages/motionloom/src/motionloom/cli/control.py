@@ -42,7 +42,6 @@ from motionloom.weights.prior import Prior
 
 def run_control(arguments: Namespace) -> int:
     """``motionloom control PROMPT --goal FILE``."""
-
     outs, target = check_outs(arguments)
     if len(one_sentence(arguments.prompt)) > 1:
         fail(f"one prompt is needed; got {len(arguments.prompt)}: {', '.join(arguments.prompt)[:200]}")
@@ -60,7 +59,7 @@ def run_control(arguments: Namespace) -> int:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
-    made = finished_motions(files, [arguments.prompt] * arguments.count, target, arguments.fps)
+    output = finished_motions(files, [arguments.prompt] * arguments.count, target, arguments.fps)
     values, judged = request_of(arguments, Control, {"goals": goal}), []
     plan = Plan(
         task="control",
@@ -70,33 +69,30 @@ def run_control(arguments: Namespace) -> int:
         adapters=_adapters(arguments.adapters, prior),
     )
 
-    def drawn() -> Iterator[list[Motion]]:
+    def sample() -> Iterator[list[Motion]]:
         for one in results("controlling", plan, Models(prior)):
             judged.append(one.about)
             yield list(one.people)
 
-    interrupted = made.take(drawn(), measured=arguments.json)
-    written = [[file for file in several if file in made.written] for several in files]
-    _report(arguments, judged[: made.count], written, made=made, metre=metre, remarks=remarks)
-    return made.ended(interrupted)
+    interrupted = output.take(sample(), measured=arguments.json)
+    _report(arguments, judged[: output.count], output, metre=metre, remarks=remarks)
+    return output.ended(interrupted)
 
 
 def _note_on_path(goal: Goal, metre: float) -> str:
-    """How a path in a robot's metres is walked by the person that is drawn."""
-
-    asked = np.flatnonzero(goal.mask[:, 0, [0, 2]].all(axis=1))
-    if len(asked) < 2:
+    """How a path in a robot's metres is walked by the generated person."""
+    frames = np.flatnonzero(goal.mask[:, 0, [0, 2]].all(axis=1))
+    if len(frames) < 2:
         return note_on_metres(metre)
-    way = float(np.linalg.norm(np.diff(goal.positions[asked, 0][:, [0, 2]], axis=0), axis=1).sum())
-    pace = way * FPS / (asked[-1] - asked[0])
+    way = float(np.linalg.norm(np.diff(goal.positions[frames, 0][:, [0, 2]], axis=0), axis=1).sum())
+    pace = way * FPS / (frames[-1] - frames[0])
     gone = f"it goes {metre * way:.2f} m at {metre * pace:.2f} m/s, as a person would at {pace:.2f} m/s"
     return f"goals are in the robot's metres: {gone}"
 
 
 def _goal(arguments: Namespace, metre: float) -> Goal:
-    """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a clip that
+    """All goals of the line as one goal of the generated person, whose metre becomes ``metre``; a clip that
     is followed is the person's anyway."""
-
     if bool(arguments.follow) != (arguments.clip is not None):
         fail("--follow names joints of the motion that --from names; give both or none")
     if arguments.width is not None and arguments.path is None:
@@ -114,7 +110,7 @@ def _goal(arguments: Namespace, metre: float) -> Goal:
     whole = goals[0]
     for other in goals[1:]:
         if clip is not None and other is goals[-1] and (whole.start is not None or whole.mask[0, 0].any()):
-            other = replace(other, start=None)  # the person starts where the goals say, not where the clip's does
+            other = replace(other, start=None)  # the person starts at the goals' start, not at the clip's
         whole = merged(whole, other)
     try:
         check_reach(whole)
@@ -125,11 +121,10 @@ def _goal(arguments: Namespace, metre: float) -> Goal:
 
 def _goal_of_drawing(path: Path, width: float | None, frames: int, metre: float) -> Goal:
     """The line of an SVG file."""
-
     if not path.is_file():
         fail(f"--path: there is no file {quoted(str(path))}")
     size = {} if width is None else {"width": width}
-    drawing = path.resolve()  # a link may lead anywhere
+    drawing = path.resolve()  # a link may go anywhere
     return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent, metre=metre)
 
 
@@ -148,9 +143,8 @@ def _adapters(names: list[str], prior: Prior) -> Adapters:
 def _report(
     arguments: Namespace,
     judged: list[Controlled],
-    written: list[list[Path]],
+    output: Finished[Motion],
     *,
-    made: Finished[Motion],
     metre: float,
     remarks: list[str],
 ) -> None:
@@ -166,7 +160,7 @@ def _report(
                 "error_cm": round(100 * metre * one.error, 3),
                 "worst_cm": round(100 * metre * one.worst, 3),
                 "missed": one.missed,
-                "happened": made.happened[number],
+                "happened": output.happened[number],
             }
             for number, one in enumerate(judged)
         ]
@@ -176,10 +170,11 @@ def _report(
             "weights": str(arguments.weights),
             "remarks": remarks,
         }
-        report(arguments, about, [path for several in written for path in several], made.sampling)
+        report(arguments, about, output.paths, output.sampling)
         return
-    for several in written:
-        for number, path in enumerate(several):
+    paths = output.paths
+    for several in output.files:
+        for number, path in enumerate(file for file in several if file in paths):
             of = judged if len(several) == 1 else [judged[number]]
             mean, worst = sum(one.error for one in of) / len(of), max(one.worst for one in of)
             print(f"wrote {path}: {100 * metre * mean:.1f} cm from its goals, at most {100 * metre * worst:.1f} cm")

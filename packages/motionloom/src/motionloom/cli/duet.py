@@ -43,7 +43,7 @@ from motionloom.weights.pair import PairBlock
 MAX_SECONDS = 3600.0
 """Of a timeline."""
 SECONDS, ADDED = 6.0, 3.0
-"""Length of a duet, and what is added to a past, unless asked otherwise."""
+"""Length of a duet, and what is added to a past, unless the line says otherwise."""
 SINGLE = writable(single=True)
 """Files of one person each."""
 REMARKED = 64
@@ -52,7 +52,6 @@ REMARKED = 64
 
 def run_duet(arguments: Namespace) -> int:
     """``motionloom duet``."""
-
     _check(arguments)
     outs, target = check_pair_outs(arguments)
     files = places(outs, arguments.count, target, sheets=False)
@@ -62,47 +61,47 @@ def run_duet(arguments: Namespace) -> int:
     goals = _goals(arguments, metre)
     if metre != 1.0 and (any(goals) or (timeline is not None and timeline.asks)):
         note(note_on_metres(metre))
-    given, written_as = _read(arguments, target)
-    _check_sizes(arguments, files, given, timeline)
+    people, targets = _read(arguments, target)
+    _check_sizes(arguments, files, people, timeline)
     prior = load_prior(arguments)
     block = PairBlock.load(arguments.pair_weights, prior)
-    said = remarks_on_two(_texts(arguments, timeline), block.known, prior.known, prior.text)
-    remarks = _printed([one.line for one in said])
+    words = remarks_on_two(_texts(arguments, timeline), block.known, prior.known, prior.text)
+    remarks = _printed([one.line for one in words])
     caption = _caption(arguments, timeline)
 
     def write(duets: Sequence[list[Motion]], places: list[list[Path]], first: int) -> None:
-        write_pairs(duets, places, written_as, caption)
+        write_pairs(duets, places, targets, caption)
 
-    def put(duets: Sequence[list[Motion]]) -> list[list[Motion]]:
-        return [target.put_together(at_rate(duet, arguments.fps)) for duet in duets]
+    def convert(duets: Sequence[list[Motion]]) -> list[list[Motion]]:
+        return [target.retarget_all(at_rate(duet, arguments.fps)) for duet in duets]
 
-    made = Finished(files, arguments.count, write, put, what="duets")
+    output = Finished(files, arguments.count, write, convert, what="duets")
     seconds = 0.0
     measures: list[dict[str, float]] = []
 
-    def drawn() -> Iterator[list[list[Motion]]]:
+    def sample() -> Iterator[list[list[Motion]]]:
         nonlocal seconds
-        plan = _plan(arguments, given, timeline, goals)
+        plan = _plan(arguments, people, timeline, goals)
         for one in results("drawing two people", plan, Models(prior, block)):
             seconds = one.people[0].seconds
             measures.append(_measures(one.people))
             yield [list(one.people)]
 
-    interrupted = made.take(drawn(), measured=arguments.json)
-    about = _about(arguments, made.count, seconds)
+    interrupted = output.take(sample(), measured=arguments.json)
+    about = _about(arguments, output.count, seconds)
     about |= {
-        "measures": measures[: made.count],
-        "happened": made.happened,
-        "remarks": remarks + _printed(_remarks(measures[: made.count])),
+        "measures": measures[: output.count],
+        "happened": output.happened,
+        "remarks": remarks + _printed(_remarks(measures[: output.count])),
     }
-    report(arguments, about, made.written, made.sampling)
+    report(arguments, about, output.paths, output.sampling)
     note_rate(arguments, _inputs(arguments))
-    return made.ended(interrupted)
+    return output.ended(interrupted)
 
 
 def _plan(
     arguments: Namespace,
-    given: list[Motion],
+    people: list[Motion],
     timeline: Timeline | None,
     goals: tuple[Goal | None, Goal | None],
 ) -> Plan:
@@ -115,7 +114,7 @@ def _plan(
         seconds=usual if arguments.seconds is None else arguments.seconds,
         timeline=timeline,
         goals=goals,
-        people=tuple(given),
+        people=tuple(people),
     )
 
 
@@ -140,7 +139,6 @@ def _read(arguments: Namespace, target: Target) -> tuple[list[Motion], list[Targ
 
 
 def _timeline(arguments: Namespace, metre: float) -> Timeline:
-
     path = arguments.timeline
     timeline = read_timeline(path, metre)
 
@@ -161,17 +159,16 @@ def _timeline(arguments: Namespace, metre: float) -> Timeline:
 
 
 def _goals(arguments: Namespace, metre: float) -> tuple[Goal | None, Goal | None]:
-    """What the first and what the second is asked."""
-    asked = [_goal(arguments, path, metre) for path in arguments.path or ()]
-    if len(asked) == 2:
-        return asked[0], asked[1]
-    goal = asked[0] if asked else None
+    """The goals of the first and of the second."""
+    goals = [_goal(arguments, path, metre) for path in arguments.path or ()]
+    if len(goals) == 2:
+        return goals[0], goals[1]
+    goal = goals[0] if goals else None
     return (goal, None) if arguments.person == 1 else (None, goal)
 
 
 def _goal(arguments: Namespace, path: Path, metre: float) -> Goal:
-    """What somebody is asked: a goal file, such a mapping in YAML, or a drawn line."""
-
+    """The goal of one of the two: a goal file, such a mapping in YAML, or the line of a drawing."""
     frames = frames_in(SECONDS if arguments.seconds is None else arguments.seconds, FPS)
     if path.suffix.lower() in (".yaml", ".yml"):
         what = read_lined(path).plain()
@@ -184,13 +181,13 @@ def _goal(arguments: Namespace, path: Path, metre: float) -> Goal:
         except MotionloomError as error:
             fail(f"{path}: {error}")
     if path.suffix.lower() == ".svg":
-        drawing = path.resolve() if path.exists() else path  # a link may lead anywhere
+        drawing = path.resolve() if path.exists() else path  # a link may go anywhere
         what = {"path": {"svg": drawing.name}}
         return read_goal(what, frames=frames, folder=drawing.parent, metre=metre)
     return read_goal(path, frames=frames, folder=path.parent, metre=metre)
 
 
-# What cannot be asked
+# Requests that cannot be met
 
 
 def _check(arguments: Namespace) -> None:
@@ -236,15 +233,16 @@ def _single(target: Target) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*SINGLE, *target.suffixes)))
 
 
-def _check_sizes(arguments: Namespace, files: list[list[Path]], given: list[Motion], timeline: Timeline | None) -> None:
+def _check_sizes(
+    arguments: Namespace, files: list[list[Path]], people: list[Motion], timeline: Timeline | None
+) -> None:
     """Refuse what no file or memory holds, before any work."""
-
-    if timeline is None and not given:
+    if timeline is None and not people:
         return
     added = ADDED if arguments.seconds is None else arguments.seconds
-    seconds = timeline.seconds if timeline else given[0].seconds + (added if arguments.past else 0.0)
-    rate = arguments.fps or (given[0].fps if given else 20.0)
-    joints = [len(motion.skeleton) for motion in given] or [22]
+    seconds = timeline.seconds if timeline else people[0].seconds + (added if arguments.past else 0.0)
+    rate = arguments.fps or (people[0].fps if people else 20.0)
+    joints = [len(motion.skeleton) for motion in people] or [22]
     for place in (place for several in files for place in several):
         check_length(place, total=round(seconds * rate), fps=rate, joints=max(joints))
     if 2 * max(joints) * seconds * rate * arguments.count > MAX_POSES:
@@ -255,9 +253,9 @@ def _check_sizes(arguments: Namespace, files: list[list[Path]], given: list[Moti
 
 
 def _texts(arguments: Namespace, timeline: Timeline | None) -> list[str]:
-    """What the two are asked in words."""
-    said = [arguments.text or ""] if timeline is None else [segment.text for segment in timeline.segments[:REMARKED]]
-    return [text for text in dict.fromkeys(said) if text.strip()]
+    """The words for the two."""
+    texts = [arguments.text or ""] if timeline is None else [segment.text for segment in timeline.segments[:REMARKED]]
+    return [text for text in dict.fromkeys(texts) if text.strip()]
 
 
 def _printed(lines: list[str]) -> list[str]:
@@ -279,18 +277,18 @@ def write_pairs(
     caption: str,
 ) -> list[Path]:
     """All files, duet by duet; a person whose motion came from a BVH file keeps its unit and orders."""
-    written, names, single = [], targets[0].names([caption] * 2), _single(targets[0])
+    paths, names, single = [], targets[0].names([caption] * 2), _single(targets[0])
     for number, duet in enumerate(duets):
-        seen: Counter[str] = Counter()
+        counts: Counter[str] = Counter()
         for out in (several[number] for several in files):
             suffix = out.suffix.lower()
             if suffix not in single:
-                written.append(targets[0].save_together(duet, out, caption))
+                paths.append(targets[0].save_together(duet, out, caption))
                 continue
-            person = seen[suffix]
-            seen[suffix] += 1
-            written.append(targets[person].save(duet[person], out, caption=names[person]))
-    return written
+            person = counts[suffix]
+            counts[suffix] += 1
+            paths.append(targets[person].save(duet[person], out, caption=names[person]))
+    return paths
 
 
 def _about(arguments: Namespace, count: int, seconds: float) -> dict[str, Any]:
@@ -309,7 +307,6 @@ def _about(arguments: Namespace, count: int, seconds: float) -> dict[str, Any]:
 
 def _measures(duet: Sequence[Motion]) -> dict[str, float]:
     """How near the two bodies and their hands come, and how deep and in how many frames they are in each other."""
-
     first, second = (joints22(person) for person in duet)
     apart, depth = trunk_distance(first, second), overlap(first, second)
     hands = wrist_distance(first, second)

@@ -23,8 +23,7 @@ from motionloom.tasks.run import Models, Plan
 
 def run_edit(arguments: Namespace) -> int:
     """``motionloom edit CLIP TEXT``."""
-
-    uniform = arguments.skeleton in ("smpl", "smpl22")  # made so, rather than put on it afterwards
+    uniform = arguments.skeleton in ("smpl", "smpl22")  # generated so, rather than put on it afterwards
     arguments.skeleton = None if uniform or arguments.skeleton == "own" else arguments.skeleton
     outs, target = check_outs(arguments)
     if arguments.text is not None:
@@ -38,23 +37,23 @@ def run_edit(arguments: Namespace) -> int:
     prior = load_prior(arguments)
     keep = [name.strip() for part in arguments.keep for name in part.split(",")]
     remarks = [] if is_only_head_free(keep) else remark_unknown(prior, [arguments.text or ""])
-    written_as = target if uniform else target.like(unit, orders)
-    made = finished_motions(files, captions, written_as, arguments.fps, first=True)
+    target = target if uniform else target.like(unit, orders)
+    output = finished_motions(files, captions, target, arguments.fps, first=True)
     values = request_of(arguments, Edit, {"motion": clip, "prompt": arguments.text, "keep": keep})
     source = None if arguments.source is None else read_clip(arguments, arguments.source)[0]
     clip = crop(clip, arguments)
     people = (to_smpl22(clip) if uniform else clip,)
     plan = Plan(task="edit", values=values, sampling=values.sampling, people=people, target=source)
     versions = results("editing", plan, Models(prior))
-    interrupted = made.take((list(one.people) for one in versions), measured=arguments.json)
+    interrupted = output.take((list(one.people) for one in versions), measured=arguments.json)
     about = {
         "clip": str(arguments.clip),
         "prompt": arguments.text,
-        "seeds": [arguments.seed + i for i in range(made.count)],
+        "seeds": [arguments.seed + i for i in range(output.count)],
         "weights": str(arguments.weights),
         "remarks": remarks,
-        "happened": made.happened,
+        "happened": output.happened,
     }
-    report(arguments, about, made.written, made.sampling)
+    report(arguments, about, output.paths, output.sampling)
     note_rate(arguments, [arguments.clip])
-    return made.ended(interrupted)
+    return output.ended(interrupted)

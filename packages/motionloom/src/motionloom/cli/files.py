@@ -29,7 +29,6 @@ from motionloom.motion import Motion
 
 def run_export(arguments: Namespace) -> int:
     """``motionloom export IN OUT``."""
-
     if arguments.check:
         return check_inputs(arguments)
     arguments.inputs, out = _files(arguments)
@@ -40,27 +39,27 @@ def run_export(arguments: Namespace) -> int:
             f"{len(arguments.inputs)} motions go into one file as animations of a character: --skeleton hero.glb "
             "--out moving.glb; else export one at a time"
         )
-    read = [_exported(arguments, path, target) for path in arguments.inputs]
+    clips = [_exported(arguments, path, target) for path in arguments.inputs]
     check_overwriting(arguments, [out])
     if arguments.source_map and target.skeleton is None:
         fail("--source-map says which joints are which for a --skeleton; name one")
-    _write(arguments, out, read)
-    held = target.summary() or "; ".join(_summary(motion) for motion, _ in read)
+    _write(arguments, out, clips)
+    held = target.summary() or "; ".join(_summary(motion) for motion, _ in clips)
     print(f"wrote {out}: {held}")
     note_rate(arguments, arguments.inputs)
     return 0
 
 
-def _write(arguments: Namespace, out: Path, read: list[tuple[Motion, Target]]) -> None:
+def _write(arguments: Namespace, out: Path, clips: list[tuple[Motion, Target]]) -> None:
     """Write what was read; several motions into a character's own file."""
-    motion, target = read[0]
+    motion, target = clips[0]
     names = target.names([path.stem for path in arguments.inputs])
     if out.suffix.lower() != ".bvh" and (arguments.out_unit or arguments.order):
         fail(f"--out-unit and --order are for BVH files; {out} is none")
     if target.writes(out):
-        target.save_clips([motion for motion, _ in read], out, names)
+        target.save_clips([motion for motion, _ in clips], out, names)
     elif out.suffix.lower() == ".bvh":
-        motion = target.shown(motion, out)
+        motion = target.motion_for(motion, out)
         chosen = arguments.out_unit or unit_that_reads_back(motion, target.unit or 1.0)
         if unit_that_reads_back(motion, chosen) != chosen:
             note(f"give --unit {chosen:g} to read {out} at this size: bones do not show it")
@@ -77,13 +76,12 @@ def _exported(arguments: Namespace, path: Path, target: Target) -> tuple[Motion,
     motion = crop(motion, arguments)
     if arguments.mirror:
         motion = motion.mirror()
-    motion = target.put(motion, source=str(path), source_map=arguments.source_map)
+    motion = target.retarget(motion, source=str(path), source_map=arguments.source_map)
     return motion if arguments.fps is None else motion.resample(arguments.fps), target.like(unit, orders)
 
 
 def run_view(arguments: Namespace) -> None:
     """``motionloom view FILE ...``."""
-
     target = arguments.out or Path(f"{arguments.inputs[0].stem}.png")
     if target.suffix.lower() not in (".png", ".mp4", ".gif", ".html"):
         fail(f"a picture ends in .png, a film in .mp4 or .gif and a page in .html; got {target}")
@@ -115,7 +113,7 @@ def _write_page(arguments: Namespace, out: Path) -> None:
         people = io.load_scene(path) if everybody else [read_clip(arguments, path)[0]]
         motions = at_rate((crop(motion, arguments) for motion in people), arguments.fps)
         alone = len(motions) == 1
-        motions = [target.put(motions[0], source=str(path))] if alone else target.put_together(motions)
+        motions = [target.retarget(motions[0], source=str(path))] if alone else target.retarget_all(motions)
         takes.append(Take(path.stem, motions))
     write_page(takes, out, character=character)
     size = out.stat().st_size
@@ -128,7 +126,6 @@ def _write_page(arguments: Namespace, out: Path) -> None:
 
 def run_info(arguments: Namespace) -> None:
     """``motionloom info FILE``."""
-
     motion, unit, _ = read_clip(arguments, arguments.input)
     clips = open_glb(arguments.input).lengths if arguments.input.suffix.lower() in GLTF else []
     motion = crop(motion, arguments)
@@ -164,7 +161,6 @@ def _summary(motion: Motion) -> str:
 
 def _files(arguments: Namespace) -> tuple[list[Path], Path]:
     """What is read, and where to write, whether that is named as OUT or with ``--out``."""
-
     if arguments.out is not None:
         return arguments.inputs, arguments.out
     if len(arguments.inputs) < 2:

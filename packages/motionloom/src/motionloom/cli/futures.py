@@ -16,7 +16,7 @@ from motionloom.io.stream import Stream, joined
 from motionloom.motion import Motion
 
 OVERLAYS = (".png", ".mp4", ".gif")
-SHOWN = 50
+PICTURED = 50
 """Futures that pictures show, the first ones."""
 BEFORE, BEHIND = 2.0, 10.0
 """Seconds of the past, and of futures of any length, that pictures show."""
@@ -42,13 +42,12 @@ def targets(
     outs: Sequence[Path], count: int, formats: Sequence[str], *, pictures: bool, own: str | None = None
 ) -> list[Files]:
     """The files to write; refuses places that cannot be, before any work; ``own`` is a character's own suffix."""
-
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each its own name")
-    found = [_files(out, count, formats, pictures=pictures, own=own) for out in outs]
-    for place in (place for files in found if files.folder.is_dir() for place in files.files):
+    places = [_files(out, count, formats, pictures=pictures, own=own) for out in outs]
+    for place in (place for files in places if files.folder.is_dir() for place in files.files):
         check_output(place, own=own)
-    return found
+    return places
 
 
 def _files(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Files:
@@ -73,7 +72,6 @@ def _files(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own
 
 def _film() -> str:
     """Name of a folder's film: a .gif where there is no ffmpeg for an .mp4."""
-
     try:
         check_program("overlay.mp4")
     except MotionloomError:
@@ -82,16 +80,15 @@ def _film() -> str:
 
 
 def write_futures(
-    wanted: Sequence[Files], motions: Sequence[Motion], past: int, target: Target, *, caption: str
+    outputs: Sequence[Files], motions: Sequence[Motion], past: int, target: Target, *, caption: str
 ) -> list[Path]:
     """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does.
 
-    There may be fewer than names in ``wanted``: then the first of those are written. Gives the files that were.
+    There may be fewer than names in ``outputs``: then the first of those are written. Gives the files that were.
     """
-
-    motions = [target.put(motion) for motion in motions]
+    motions = [target.retarget(motion) for motion in motions]
     with ExitStack() as stack:
-        for files in wanted:
+        for files in outputs:
             folder = stack.enter_context(atomic_folder(files.folder))
             for names in files.futures:
                 for motion, name in zip(motions, names[: len(motions)], strict=True):
@@ -99,7 +96,7 @@ def write_futures(
             draw_overlays(motions, past, [folder / name for name in files.overlays], caption=caption)
     return [
         files.folder / name
-        for files in wanted
+        for files in outputs
         for names in (*(names[: len(motions)] for names in files.futures), files.overlays)
         for name in names
     ]
@@ -112,7 +109,7 @@ def draw_overlays(motions: Sequence[Motion], past: int, files: Sequence[Path], *
     from motionloom.viz.overlay import draw_futures
 
     known = motions[0].frames(0, past)
-    futures = [motion.frames(past, len(motion)) for motion in motions[:SHOWN]]
+    futures = [motion.frames(past, len(motion)) for motion in motions[:PICTURED]]
     for file in files:
         draw_futures(known, futures, file, caption=caption, lead=BEFORE)
 
@@ -122,9 +119,9 @@ def draw_overlays(motions: Sequence[Motion], past: int, files: Sequence[Path], *
 
 @dataclass(eq=False)
 class Long:
-    """Futures that are written while they are made, and what became of them."""
+    """Futures that are written while they are generated, and what became of them."""
 
-    wanted: Sequence[Files]
+    outputs: Sequence[Files]
     target: Target
     past: int
     """Frames that are given, at the beginning of each."""
@@ -137,15 +134,14 @@ class Long:
     def write(self, makers: Iterable[Iterable[Motion]]) -> bool:
         """One future after the other, each in pieces; true if that was interrupted after something was finished.
 
-        A failure in between leaves what was finished too, and its message says so.
+        A failure in between leaves what was finished too, and its message reports that.
         """
-
         problem: BaseException | None = None
         with ExitStack() as stack:
-            folders = [stack.enter_context(atomic_folder(files.folder)) for files in self.wanted]
+            folders = [stack.enter_context(atomic_folder(files.folder)) for files in self.outputs]
             try:
                 heads = [self._one(number, pieces, folders) for number, pieces in enumerate(makers)]
-                self._draw(heads[:SHOWN], folders)
+                self._draw(heads[:PICTURED], folders)
             except (KeyboardInterrupt, MotionloomError) as error:
                 if not self.finished:
                     raise
@@ -163,35 +159,34 @@ class Long:
         coming = iter(pieces)
         first = next(coming)
         streams = self._open(number, first, folders)
-        shown: list[Motion] = []
+        head: list[Motion] = []
 
-        def seen() -> Iterator[Motion]:
+        def collect() -> Iterator[Motion]:
             at = 0
             for piece in chain([first], coming):
                 yield piece
-                shown.extend(self._shown(piece, at) if number < SHOWN else [])
+                head.extend(self._head_of(piece, at) if number < PICTURED else [])
                 at += len(piece)
 
         try:
-            write_pieces(seen(), [stream for _, stream in streams])
+            write_pieces(collect(), [stream for _, stream in streams])
         finally:
             self.finished += [(place, stream.seconds) for place, stream in streams if stream.saved]
-        return joined(shown) if shown else None
+        return joined(head) if head else None
 
     def _open(self, number: int, piece: Motion, folders: Sequence[Path]) -> list[tuple[Path, Stream]]:
         """The files of one future, and where they will be; those that grow on the disk last: they close first."""
-
-        found = []
-        for files, folder in zip(self.wanted, folders, strict=True):
+        streams = []
+        for files, folder in zip(self.outputs, folders, strict=True):
             for name in (names[number] for names in files.futures):
                 joints, caption = len(piece.skeleton), Path(name).stem
                 stream = self.target.open(
                     folder / name, total=self.frames, fps=piece.fps, joints=joints, caption=caption
                 )
-                found.append((files.folder / name, stream))
-        return sorted(found, key=lambda pair: pair[0].suffix.lower() == ".bvh")
+                streams.append((files.folder / name, stream))
+        return sorted(streams, key=lambda pair: pair[0].suffix.lower() == ".bvh")
 
-    def _shown(self, piece: Motion, at: int) -> list[Motion]:
+    def _head_of(self, piece: Motion, at: int) -> list[Motion]:
         """What pictures show of a piece whose first frame is number ``at``."""
         first = max(self.past - round(BEFORE * piece.fps) - at, 0)
         behind = min(self.past + round(BEHIND * piece.fps) - at, len(piece))
@@ -199,7 +194,7 @@ class Long:
 
     def _draw(self, heads: Sequence[Motion | None], folders: Sequence[Path]) -> None:
         motions = [head for head in heads if head is not None]
-        for files, folder in zip(self.wanted, folders, strict=True):
+        for files, folder in zip(self.outputs, folders, strict=True):
             if not motions:
                 continue
             past = min(self.past, round(BEFORE * motions[0].fps))

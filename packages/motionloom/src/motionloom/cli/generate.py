@@ -56,35 +56,35 @@ def run_generate(arguments: Namespace) -> int:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     timelines = {prompt: _timeline(arguments, prior, prompt, target.metre) for prompt in prompts}
-    for found in timelines.values():
-        check_loop(arguments, found.seconds)
-    remarks = unknown_words(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    made = finished_motions(files, captions, target, arguments.fps)
+    for timeline in timelines.values():
+        check_loop(arguments, timeline.seconds)
+    remarks = unknown_words(prior, [part.text for one in timelines.values() for part in one.segments])
+    output = finished_motions(files, captions, target, arguments.fps)
     worded: list[Worded] = []
     seated: list[list[Seat]] = []
-    asked = [(prompt, timelines[prompt]) for prompt in prompts]
+    requests = [(prompt, timelines[prompt]) for prompt in prompts]
 
-    def sampled() -> Iterator[list[Motion]]:
-        for motion in _generated(arguments, prior, asked, worded, unknown=remarks):
+    def sample() -> Iterator[list[Motion]]:
+        for motion in _generated(arguments, prior, requests, worded, unknown=remarks):
             seated.append([_moved(seat, target, motion) for seat in seats(motion.positions(), motion.fps)])
             yield [motion]
 
-    interrupted = made.take(sampled(), measured=arguments.json)
+    interrupted = output.take(sample(), measured=arguments.json)
     motions = [
         {
             "prompt": caption,
             "seed": arguments.seed + i,
             "segments": segment_rows(worded[i].timeline),
-            "seats": [asdict(seat) for seat in taken],
+            "seats": [asdict(seat) for seat in own],
             "stairs": stairs_under(worded[i].motion),
             "amounts": [asdict(one) for one in worded[i].amounts],
             "missing": worded[i].missing,
             "still_from": worded[i].still_from,
         }
-        for i, (caption, taken) in enumerate(zip(captions[: made.count], seated))
+        for i, (caption, own) in enumerate(zip(captions[: output.count], seated))
     ]
-    _remark_seats(seated[: made.count])
-    for motion, did in zip(motions, made.happened):
+    _remark_seats(seated[: output.count])
+    for motion, did in zip(motions, output.happened):
         motion["happened"] = did
     for number, motion in enumerate(motions, start=1):
         if under := motion["stairs"]:
@@ -100,23 +100,22 @@ def run_generate(arguments: Namespace) -> int:
         "weights": str(arguments.weights),
         "remarks": list(remarks.values()),
     }
-    report(arguments, about, made.written, made.sampling)
-    return made.ended(interrupted)
+    report(arguments, about, output.paths, output.sampling)
+    return output.ended(interrupted)
 
 
 def stairs_under(motion: Motion) -> dict[str, Any] | None:
-    """The steps under somebody who climbs: their number and rise, and when and where each foot stands on one."""
-
+    """The steps under a person who climbs: their number and rise, and when and where each foot is on one."""
     places = motion.positions()
-    found = stairs(places, motion.fps)
-    if found is None:
+    flight = stairs(places, motion.fps)
+    if flight is None:
         return None
     holds = []
-    for hold, level in zip(found.holds, found.levels, strict=True):
+    for hold, level in zip(flight.holds, flight.levels, strict=True):
         x, _, z = np.median(places[hold.first : hold.end, TOES[hold.side]], axis=0).tolist()
         times = {"begin": hold.first / motion.fps, "end": hold.end / motion.fps}
-        holds.append(times | {"x": round(x, 3), "z": round(z, 3), "height": round(level * found.rise, 3)})
-    return {"steps": found.steps, "rise": found.rise, "footholds": holds}
+        holds.append(times | {"x": round(x, 3), "z": round(z, 3), "height": round(level * flight.rise, 3)})
+    return {"steps": flight.steps, "rise": flight.rise, "footholds": holds}
 
 
 def _moved(seat: Seat, target: Target, motion: Motion) -> Seat:
@@ -126,10 +125,10 @@ def _moved(seat: Seat, target: Target, motion: Motion) -> Seat:
 
 
 def _remark_seats(seated: list[list[Seat]]) -> None:
-    """Say on stderr where a seat belongs: nothing is drawn but the person."""
-    for number, found in enumerate(seated, start=1):
+    """Note where a seat belongs: nothing is generated but the person."""
+    for number, own in enumerate(seated, start=1):
         whose = f"motion {number} " if len(seated) > 1 else ""
-        for one in found[:3]:
+        for one in own[:3]:
             say(
                 f"{whose}sits from {one.begin:.1f} to {one.end:.1f} s: a seat {one.height:.2f} m high "
                 f"belongs at x {one.x:.2f}, z {one.z:.2f} m"
@@ -137,10 +136,10 @@ def _remark_seats(seated: list[list[Seat]]) -> None:
 
 
 def _timeline(arguments: Namespace, prior: Prior, prompt: str, metre: float) -> Timeline:
-    """What a prompt asks, one segment or several; says so where there are several. metre: as of `Target.metre`."""
+    """The timeline of a prompt; notes it where there are several segments. metre: as of `Target.metre`."""
     from motionloom.tasks.worded import read
 
-    found = read(
+    timeline = read(
         prior,
         prompt,
         arguments.seconds,
@@ -148,13 +147,13 @@ def _timeline(arguments: Namespace, prior: Prior, prompt: str, metre: float) -> 
         amounts=not (arguments.literal or arguments.as_one),
         metre=metre,
     )
-    if said := numbers_read(found):
-        say(f"{said}; --literal leaves numbers to the network")
-    if said := parts_read(found):
+    if remark := numbers_read(timeline):
+        say(f"{remark}; --literal leaves numbers to the network")
+    if remark := parts_read(timeline):
         if arguments.solver != SOLVER:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
-        say(f"{said}; --as-one leaves the sentence whole")
-    return found
+        say(f"{remark}; --as-one leaves the sentence whole")
+    return timeline
 
 
 LONGEST = 30.0
@@ -178,7 +177,6 @@ def _prompts(arguments: Namespace) -> list[str]:
 
 
 def _lines(file: Path) -> list[str]:
-
     try:
         read = sys.stdin.buffer.read(16_000_000) if str(file) == "-" else read_text(file, max_bytes=16_000_000)
         text = read.decode("utf-8")
@@ -190,19 +188,18 @@ def _lines(file: Path) -> list[str]:
 def _generated(
     arguments: Namespace,
     prior: Prior,
-    asked: list[tuple[str, Timeline]],
+    requests: list[tuple[str, Timeline]],
     worded: list[Worded],
     *,
     unknown: dict[str, str],
 ) -> Iterator[Motion]:
     """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
-
     plans = []
-    for number, (prompt, timeline) in enumerate(asked):
+    for number, (prompt, timeline) in enumerate(requests):
         values = request_of(arguments, Generate, {"prompt": prompt})
         sampling = replace(values.sampling, seed=arguments.seed + number * arguments.count)
         plans.append(Plan(task="generate", values=values, sampling=sampling, timeline=timeline))
-    several = len(asked) * arguments.count > 1
+    several = len(requests) * arguments.count > 1
     with bar("generating") as progress:
         for _, result in run_each(plans, Models(prior), progress):
             one = replace(result.about, unknown=unknown)

@@ -30,7 +30,6 @@ from motionloom.weights.prior import Prior
 
 def run_live(arguments: Namespace) -> int:
     """``motionloom live SCRIPT``."""
-
     script = read_script(arguments.script)
     check_loop(arguments, script.seconds)
     if arguments.check:
@@ -51,18 +50,17 @@ def run_live(arguments: Namespace) -> int:
         note(note_on_metres(metre))
     live = _stage(arguments, script, prior, seed, metre=metre)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
-    words = [[one.words for one in shown] for shown in frames]
-    motions = [motion_of([shown[i] for shown in frames], live.fps) for i in range(script.people)]
-    motions = [looped(arguments, prior, one, said, seed=seed) for one, said in zip(motions, words[-1], strict=True)]
+    words = [[one.words for one in frame] for frame in frames]
+    motions = [motion_of([frame[i] for frame in frames], live.fps) for i in range(script.people)]
+    motions = [looped(arguments, prior, one, text, seed=seed) for one, text in zip(motions, words[-1], strict=True)]
     write = _write if script.people == 1 else _write_pair
-    written = write(motions, words, outs, target)
+    paths = write(motions, words, outs, target)
     did = happened(motions) if arguments.json else []
-    _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames), "happened": did})
+    _report(arguments, script, paths, health, {"calls": live.calls, "frames": len(frames), "happened": did})
     return 0
 
 
 def _stage(arguments: Namespace, script: Script, prior: Prior, seed: int, *, metre: float) -> Stage:
-
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
     starts = [load_motion(arguments, path) for path in arguments.start or ()]
     shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings, "metre": metre}
@@ -73,13 +71,12 @@ def _stage(arguments: Namespace, script: Script, prior: Prior, seed: int, *, met
 
 
 def _against_time(script: Script, live: Stage) -> tuple[list[tuple[Frame, ...]], Health]:
-    """The session as somebody would see it who asks at the script's times."""
-
+    """The session as a client would see it that sends commands at the script's times."""
     waiting = list(script.commands)[::-1]
     frames: list[tuple[Frame, ...]] = []
     with Player(live) as player:
-        for shown in player.frames():
-            frames.append((shown,) if isinstance(shown, Frame) else shown)
+        for frame in player.frames():
+            frames.append((frame,) if isinstance(frame, Frame) else frame)
             while waiting and waiting[-1].at <= frames[-1][0].time + 1e-6:
                 _, command, person = waiting.pop()
                 player.ask(command, person)
@@ -95,14 +92,14 @@ def _write(
     (whole,) = motions
     stretches: list[tuple[str, Motion]] = []
     begin = 0
-    for said, part in groupby(one for (one,) in words):
+    for text, part in groupby(one for (one,) in words):
         begin, first = begin + len(list(part)), begin
-        stretches.append((said, whole.frames(first, begin)))
-    said = "; ".join(one for one, _ in stretches[:20])
+        stretches.append((text, whole.frames(first, begin)))
+    caption = "; ".join(one for one, _ in stretches[:20])
     files: list[Path] = []
     for out in outs:
-        pieces = stretches[:50] if out.suffix.lower() == ".png" and target.skeleton is None else [(said, whole)]
-        files += target.save_all([target.put(motion) for _, motion in pieces], [out], [one for one, _ in pieces])
+        pieces = stretches[:50] if out.suffix.lower() == ".png" and target.skeleton is None else [(caption, whole)]
+        files += target.save_all([target.retarget(motion) for _, motion in pieces], [out], [one for one, _ in pieces])
     return files
 
 
@@ -110,25 +107,25 @@ def _write_pair(
     motions: Sequence[Motion], words: Sequence[Sequence[str]], outs: Sequence[Path], target: Target
 ) -> list[Path]:
     """The files of two people; those that hold one person each come in twos."""
-    said = dict.fromkeys(" :: ".join(both) for both in words)
-    return write_pairs([target.put_together(motions)], [[out] for out in outs], [target] * 2, "; ".join([*said][:20]))
+    texts = dict.fromkeys(" :: ".join(both) for both in words)
+    return write_pairs([target.retarget_all(motions)], [[out] for out in outs], [target] * 2, "; ".join([*texts][:20]))
 
 
 def _report(
     arguments: Namespace,
     script: Script,
-    written: Sequence[Path],
+    paths: Sequence[Path],
     health: Health | None,
-    made: dict[str, Any],
+    figures: dict[str, Any],
 ) -> None:
     if arguments.json:
-        about = {"seconds": script.seconds, "commands": len(script.commands), "files": [str(path) for path in written]}
-        print(json.dumps({**about, **made, **({"clock": asdict(health)} if health else {})}, indent=1))
+        about = {"seconds": script.seconds, "commands": len(script.commands), "files": [str(path) for path in paths]}
+        print(json.dumps({**about, **figures, **({"clock": asdict(health)} if health else {})}, indent=1))
         return
-    for path in written:
-        frames = "" if arguments.robot else f", {made['frames']} frames"  # a robot's file has its own rate
-        print(f"wrote {path}: {script.seconds:.2f} s{frames}, {made['calls']} network calls")
-    if not written:
+    for path in paths:
+        frames = "" if arguments.robot else f", {figures['frames']} frames"  # a robot's file has its own rate
+        print(f"wrote {path}: {script.seconds:.2f} s{frames}, {figures['calls']} network calls")
+    if not paths:
         print(f"{len(script.commands)} commands in {script.seconds:.2f} s; nothing was made")
     if health:
         print(

@@ -26,42 +26,41 @@ def with_command(words: Sequence[str], commands: Iterable[str]) -> list[str]:
 
     Raises `MotionloomError` where the first word is no command.
     """
-
-    known, found = list(commands), list(words)
-    if not found or found[0].startswith("-") or found[0] in known:
-        return found
-    if found[0] in COMMANDS:
-        return [COMMANDS[found[0]], *found[1:]]
-    close = difflib.get_close_matches(found[0].lower(), [*known, *COMMANDS], n=1, cutoff=0.7)
-    if close and " " not in found[0]:
-        line = " ".join([COMMANDS.get(close[0], close[0]), *found[1:]])
-        raise MotionloomError(f"there is no command {found[0]!r}; did you mean: motionloom {line}")
-    sentence = " ".join(word for word in found if not word.startswith("-"))
+    known, words = list(commands), list(words)
+    if not words or words[0].startswith("-") or words[0] in known:
+        return words
+    if words[0] in COMMANDS:
+        return [COMMANDS[words[0]], *words[1:]]
+    close = difflib.get_close_matches(words[0].lower(), [*known, *COMMANDS], n=1, cutoff=0.7)
+    if close and " " not in words[0]:
+        line = " ".join([COMMANDS.get(close[0], close[0]), *words[1:]])
+        raise MotionloomError(f"there is no command {words[0]!r}; did you mean: motionloom {line}")
+    sentence = " ".join(word for word in words if not word.startswith("-"))
     if " " in sentence:
         raise MotionloomError(f'a command comes first; did you mean: motionloom generate "{sentence}"')
-    raise MotionloomError(f"there is no command {found[0]!r}; the commands are {', '.join(known)}")
+    raise MotionloomError(f"there is no command {words[0]!r}; the commands are {', '.join(known)}")
 
 
 def with_options(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
     """The words behind a command with its options under the names they have here."""
     known = option_names(parser)
     takes_prompt = any(action.dest in _PROMPTS for action in parser._actions)
-    found, plain = [], False
+    options, plain = [], False
     for word in words:
         name, equals, value = word.partition("=")
         plain = plain or word == "--"
         if plain or name in known:
-            found.append(word)
+            options.append(word)
         elif RENAMED.get(name) in known:
             note(f"{name} is {RENAMED[name]} now; the old name goes with the next release")
-            found.append(RENAMED[name] + equals + value)
+            options.append(RENAMED[name] + equals + value)
         elif OPTIONS.get(name) in known:
-            found.append(OPTIONS[name] + equals + value)
+            options.append(OPTIONS[name] + equals + value)
         elif name == "--prompt" and takes_prompt:
-            found += [value] if equals else []  # the sentence itself is the next word
+            options += [value] if equals else []  # the sentence itself is the next word
         else:
-            found.append(word)
-    return found
+            options.append(word)
+    return options
 
 
 def option_names(parser: argparse.ArgumentParser) -> set[str]:
@@ -72,18 +71,18 @@ def option_names(parser: argparse.ArgumentParser) -> set[str]:
 def suggestion(parser: argparse.ArgumentParser, words: Sequence[str]) -> str:
     """``, did you mean ...`` for the first option that a command does not have, or nothing."""
     known = option_names(parser)
-    meant = {name: name for name in known} | {alias: name for alias, name in OPTIONS.items() if name in known}
+    names = {name: name for name in known} | {alias: name for alias, name in OPTIONS.items() if name in known}
     for word in words:
         name = word.partition("=")[0]
         if name in _SEVERAL and set(_SEVERAL[name]) & known:
             return f", did you mean {' or '.join(n for n in _SEVERAL[name] if n in known)}?"
-        if name.startswith("-") and (close := difflib.get_close_matches(name, sorted(meant), n=1, cutoff=0.6)):
-            return f", did you mean {meant[close[0]]}?"
+        if name.startswith("-") and (close := difflib.get_close_matches(name, sorted(names), n=1, cutoff=0.6)):
+            return f", did you mean {names[close[0]]}?"
     return ""
 
 
 def one_sentence(words: Sequence[str]) -> list[str]:
-    """Prompts; words that nobody put into quotes are one sentence."""
+    """Prompts; words without quotes are one sentence."""
     if len(words) < 2 or any(" " in word.strip() for word in words):
         return list(words)
     return [" ".join(words)]
@@ -93,13 +92,13 @@ def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
     """Let TEXT stand behind options too: argparse gives up on an optional word once it has passed its place."""
 
     def parse(args=None, namespace=None):
-        given = None if args is None else with_options(parser, args)
-        found, unknown = argparse.ArgumentParser.parse_known_args(parser, given, namespace)
-        words = [*([] if found.text is None else [found.text]), *unknown]
+        line = None if args is None else with_options(parser, args)
+        arguments, unknown = argparse.ArgumentParser.parse_known_args(parser, line, namespace)
+        words = [*([] if arguments.text is None else [arguments.text]), *unknown]
         if not any(word.startswith("-") for word in unknown) and len(one_sentence(words)) == 1:
-            found.text, unknown = one_sentence(words)[0], []
+            arguments.text, unknown = one_sentence(words)[0], []
         if unknown:
             parser.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(parser, unknown)}")
-        return found, unknown
+        return arguments, unknown
 
     parser.parse_known_args = parse  # type: ignore[method-assign]

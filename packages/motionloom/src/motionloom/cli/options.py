@@ -10,7 +10,7 @@ from motionloom.requests.fields import Spec, specs
 
 
 def option(name: str, spec: Spec) -> str:
-    """How a field is typed, such as ``--best-of``; one that is true unless said otherwise is ``--no-foot-lock``."""
+    """How a field is typed, such as ``--best-of``; one that is true by default is ``--no-foot-lock``."""
     return f"--{'no-' if spec.kind == 'flag' and spec.default else ''}{name.replace('_', '-')}"
 
 
@@ -24,8 +24,8 @@ class _Store(argparse.Action):
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
         spec, place = self.spec, self.option_strings[0]
         typed = values if isinstance(values, list) else [values]
-        found = [spec.parse(one, place) for one in typed]
-        value = tuple(found) if spec.size else found[0]
+        parsed = [spec.parse(one, place) for one in typed]
+        value = tuple(parsed) if spec.size else parsed[0]
         setattr(namespace, self.dest, (*getattr(namespace, self.dest), value) if spec.many else value)
 
 

@@ -28,7 +28,7 @@ from motionloom.tasks.run import Models, Plan
 from motionloom.weights.predictor import Predictor
 
 LONG = 30.0
-"""Seconds from which on futures are written while they are made, one after the other."""
+"""Seconds from which on futures are written while they are generated, one after the other."""
 LISTED = 40
 """Files named at the end; --json lists all."""
 SAME_BONE = 1e-4
@@ -37,59 +37,56 @@ SAME_BONE = 1e-4
 
 def run_predict(arguments: Namespace) -> int:
     """``motionloom predict PAST``."""
-
     check_rate(arguments)
-    _check_asked(arguments)
+    _check(arguments)
     outs = arguments.out or [Path("futures")]
     target = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
     target.names(["future"])
     own = target.suffix
     formats = arguments.format or [own[1:] if own else "bvh"]
-    wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
-    past, target, horizon = _read_past(arguments, target, wanted)
+    outputs = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
+    past, target, horizon = _read_past(arguments, target, outputs)
     hold = _hold(arguments, past, horizon)
     check_loop_behind(arguments, past.seconds, arguments.seconds, "nothing is held there" if hold else "")
     predictor = Predictor.load(arguments.weights, device=arguments.device)
     if arguments.seconds > LONG:
-        given, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
-        long = Long(wanted, target, given, frames, _caption(arguments))
+        known, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
+        long = Long(outputs, target, known, frames, _caption(arguments))
         return _predict_long(arguments, predictor, past, hold=hold, long=long)
     values = request_of(arguments, Predict, {"motion": past, "root": not arguments.no_root})
     plan = Plan(task="predict", values=values, sampling=values.sampling, people=(past,), hold=hold)
-    return _written(arguments, plan, predictor, wanted, target)
+    return _write_all(arguments, plan, predictor, outputs, target)
 
 
-def _written(arguments: Namespace, plan: Plan, predictor: Predictor, wanted: list[Files], target: Target) -> int:
-    """Make and write the futures, all of them at once, and say so; after an interruption those that were finished."""
-
+def _write_all(arguments: Namespace, plan: Plan, predictor: Predictor, outputs: list[Files], target: Target) -> int:
+    """Write the futures, all of them at once, and report it; after an interruption those that were finished."""
     models, past = Models(arguments.loop_weights, predictor_weights=predictor, device=arguments.device), plan.people[0]
     if arguments.loop:
-        assert models.prior  # loaded before anything is drawn
-    written: list[Path] = []
-    given = _frames_at(arguments, past, len(past))
+        assert models.prior  # loaded before anything is sampled
+    paths: list[Path] = []
+    known = _frames_at(arguments, past, len(past))
 
     def write(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
-        written.extend(write_futures(wanted, motions, given, target, caption=_caption(arguments)))
+        paths.extend(write_futures(outputs, motions, known, target, caption=_caption(arguments)))
 
-    made = Finished(
-        [[files.folder] for files in wanted[:1]],
+    output = Finished(
+        [[files.folder] for files in outputs[:1]],
         arguments.count,
         write,
-        put=lambda motions: at_rate(motions, arguments.fps),
+        convert=lambda motions: at_rate(motions, arguments.fps),
         what="futures",
     )
-    drawn = results("predicting", plan, models)
-    interrupted = made.take((list(one.people) for one in drawn), measured=arguments.json)
-    _report(arguments, [str(file) for file in written], made.count, made.happened)
+    people = (list(one.people) for one in results("predicting", plan, models))
+    interrupted = output.take(people, measured=arguments.json)
+    _report(arguments, [str(file) for file in paths], output.count, output.happened)
     if plan.task == "predict":
-        _note_seen(predictor, past)
+        _note_span(predictor, past)
     note_rate(arguments, _inputs(arguments))
-    return made.ended(interrupted)
+    return output.ended(interrupted)
 
 
 def run_switch(arguments: Namespace) -> int:
     """``motionloom switch PAST TARGET``."""
-
     check_rate(arguments)
     outs = arguments.out or [Path("switch.bvh")]
     put_on = read_target(arguments, outs)
@@ -97,15 +94,15 @@ def run_switch(arguments: Namespace) -> int:
     own = put_on.suffix
     for out in outs:
         check_output(out, own=own)  # files, and no folder
-    wanted = targets(outs, arguments.count, [], pictures=False, own=own)
-    past, put_on, horizon = _read_past(arguments, put_on, wanted)
+    outputs = targets(outs, arguments.count, [], pictures=False, own=own)
+    past, put_on, horizon = _read_past(arguments, put_on, outputs)
     target = _like_past(arguments, arguments.target, past)
     _check_poses(arguments, (len(past) + len(target) + horizon) * len(past.skeleton))
     check_loop_behind(arguments, past.seconds, arguments.seconds + target.seconds, f"{arguments.target} ends otherwise")
     predictor = Predictor.load(arguments.weights, device=arguments.device)
     values = request_of(arguments, Switch, {"motion": past, "target": target})
     plan = Plan(task="switch", values=values, sampling=values.sampling, people=(past,), target=target)
-    return _written(arguments, plan, predictor, wanted, put_on)
+    return _write_all(arguments, plan, predictor, outputs, put_on)
 
 
 # Futures of any length
@@ -129,7 +126,7 @@ def _predict_long(
         total = long.frames / (arguments.fps or past.fps)
         say(f"interrupted; what was finished is in {long.finished_files()} of {total:.2f} s")
         return 130
-    _note_seen(predictor, past)
+    _note_span(predictor, past)
     note_rate(arguments, _inputs(arguments))
     return 0
 
@@ -138,14 +135,13 @@ def _pieces(
     arguments: Namespace, predictor: Predictor, past: Motion, hold: FixedJoints | None, *, frames: int
 ) -> Generator[Iterator[Motion], None, None]:
     """Of each future its pieces, while a bar shows how far they are."""
-
     with bar("predicting") as move:
 
-        def moved(pieces: Iterator[Motion], done: int) -> Iterator[Motion]:
+        def moved(pieces: Iterator[Motion], count: int) -> Iterator[Motion]:
             for piece in pieces:
                 yield piece
-                done += len(piece)
-                move(done, frames * arguments.count)
+                count += len(piece)
+                move(count, frames * arguments.count)
 
         settings: dict[str, Any] = sampling_of(arguments) | {"count": 1}
         for number in range(arguments.count):
@@ -176,9 +172,9 @@ def _caption(arguments: Namespace) -> str:
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(arguments: Namespace, target: Target, wanted: list[Files]) -> tuple[Motion, Target, int]:
+def _read_past(arguments: Namespace, target: Target, outputs: list[Files]) -> tuple[Motion, Target, int]:
     """The past, what futures of it become, and the frames that are generated behind it."""
-    files = [file for one in wanted for file in one.files]
+    files = [file for one in outputs for file in one.files]
     check_unit(arguments, files)
     check_overwriting(arguments, files)
     whole, unit, orders = read_clip(arguments, arguments.past)
@@ -187,13 +183,12 @@ def _read_past(arguments: Namespace, target: Target, wanted: list[Files]) -> tup
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here; a past has at least two, to say where one goes: take a longer one")
     horizon = round(arguments.seconds * past.fps)
-    _check_size(arguments, past, horizon, wanted)
+    _check_size(arguments, past, horizon, outputs)
     return past, target.like(unit, orders), horizon
 
 
 def _like_past(arguments: Namespace, path: Path, past: Motion) -> Motion:
     """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
-
     alike = path.suffix.lower() == arguments.past.suffix.lower()
     motion = read_clip(arguments, path)[0] if alike else load_motion(arguments, path)
     difference = _difference(motion, past)
@@ -215,7 +210,6 @@ def _like_past(arguments: Namespace, path: Path, past: Motion) -> Motion:
 
 def _difference(motion: Motion, past: Motion) -> str:
     """Why two motions are not of one skeleton, in words; nothing if they are, but for the last digits of a file."""
-
     one, other = motion.skeleton, past.skeleton
     if one.names != other.names or one.parents != other.parents:
         return f"{len(one)} joints against {len(other)}" if len(one) != len(other) else "other joints"
@@ -226,7 +220,6 @@ def _difference(motion: Motion, past: Motion) -> str:
 
 def _hold(arguments: Namespace, past: Motion, horizon: int) -> FixedJoints | None:
     """What is held, if anything is."""
-
     if not (arguments.hold or arguments.mask):
         if arguments.source is not None:
             fail("--from says what held parts move as, and none is held; give --hold PART or --mask FILE")
@@ -255,10 +248,10 @@ def _hold(arguments: Namespace, past: Motion, horizon: int) -> FixedJoints | Non
     return FixedJoints(source.frames(skipped, len(source)), parts)
 
 
-# What cannot be asked
+# Requests that cannot be met
 
 
-def _check_asked(arguments: Namespace) -> None:
+def _check(arguments: Namespace) -> None:
     if arguments.loop and arguments.seconds > LONG:
         fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
     if arguments.loop and arguments.no_root:
@@ -267,25 +260,23 @@ def _check_asked(arguments: Namespace) -> None:
         fail("--format csv is for a robot's joint angles; name its model with --robot")
 
 
-def _check_size(arguments: Namespace, past: Motion, horizon: int, wanted: list[Files]) -> None:
+def _check_size(arguments: Namespace, past: Motion, horizon: int, outputs: list[Files]) -> None:
     """Refuse what no file or memory holds, and less than a frame."""
-
     if horizon < 1:
         fail(f"{arguments.seconds:g} s are less than a frame of {arguments.past} ({1 / past.fps:.3g} s); give more")
     joints, frames = len(past.skeleton), _frames_at(arguments, past, len(past) + horizon)
-    for file in (files.folder / names[0] for files in wanted for names in files.futures):
+    for file in (files.folder / names[0] for files in outputs for names in files.futures):
         check_length(file, total=frames, fps=arguments.fps or past.fps, joints=joints)
     if arguments.seconds <= LONG:
         _check_poses(arguments, frames * joints)
 
 
 def _frames_at(arguments: Namespace, past: Motion, count: int) -> int:
-    """How many frames so many of the past's rate become at ``--fps``, as `Motion.resample` makes them."""
+    """How many frames so many of the past's rate become at ``--fps``, as `Motion.resample` has them."""
     return count if arguments.fps is None else int((count - 1) / past.fps * arguments.fps + 1e-6) + 1
 
 
 def _check_poses(arguments: Namespace, each: int) -> None:
-
     if each * arguments.count > MAX_POSES:
         fail(
             f"{arguments.count} motions of {each:,} poses of joints each do not fit into memory, at most "
@@ -296,13 +287,13 @@ def _check_poses(arguments: Namespace, each: int) -> None:
 # What is reported
 
 
-def _note_seen(predictor: Predictor, past: Motion) -> None:
-    seen, there = predictor.observed / predictor.fps, past.seconds
-    if there > seen + 1 / past.fps:
-        note(f"of the {there:.2f} s of the past the predictor sees the last {seen:.2f}")
+def _note_span(predictor: Predictor, past: Motion) -> None:
+    span, there = predictor.observed / predictor.fps, past.seconds
+    if there > span + 1 / past.fps:
+        note(f"of the {there:.2f} s of the past the predictor sees the last {span:.2f}")
 
 
-def _report(arguments: Namespace, written: list[str], count: int, happened: Sequence[Any] = ()) -> None:
+def _report(arguments: Namespace, lines: list[str], count: int, happened: Sequence[Any] = ()) -> None:
     if arguments.json:
         about = {
             "past": str(arguments.past),
@@ -310,12 +301,12 @@ def _report(arguments: Namespace, written: list[str], count: int, happened: Sequ
             "count": count,
             "seed": arguments.seed,
             "weights": str(arguments.weights),
-            "files": written,
+            "files": lines,
             "happened": list(happened),
         }
         print(json.dumps(about, indent=1))
         return
-    for line in written[:LISTED]:
+    for line in lines[:LISTED]:
         print(f"wrote {line}")
-    if len(written) > LISTED:
-        print(f"... and {len(written) - LISTED:,} more; --json lists all")
+    if len(lines) > LISTED:
+        print(f"... and {len(lines) - LISTED:,} more; --json lists all")

@@ -45,24 +45,23 @@ def load_motion(arguments: Namespace, path: Path) -> Motion:
 
 
 def _upright(motion: Motion, path: Path, arguments: Namespace) -> Motion:
-    """The motion with +Y up, as the line says or as people stand; a remark where the file was turned."""
-
-    wanted = arguments.up
-    if wanted is None and path.suffix.lower() not in (".bvh", ".amc"):
-        return motion  # these formats say what is up
+    """The motion with +Y up, by the line or by how people stand; a remark where the file was turned."""
+    choice = arguments.up
+    if choice is None and path.suffix.lower() not in (".bvh", ".amc"):
+        return motion  # these formats define what is up
     try:
-        found = up_axis(motion, getattr(arguments, "source_map", None))
+        axis = up_axis(motion, getattr(arguments, "source_map", None))
     except MotionloomError:
-        return stood_up(motion) if wanted == "z" else motion  # no person: nothing is known
-    if wanted == "z" and found == "y":
+        return stood_up(motion) if choice == "z" else motion  # no person: nothing is known
+    if choice == "z" and axis == "y":
         fail(f"--up z, but the person in {path} stands along Y, which is up then; leave out --up")
-    if wanted is None and found == "z?":
+    if choice is None and axis == "z?":
         fail(
             f"the person in {path} lies along Z all the time; say --up z if Z is up in the file, --up y if they do lie"
         )
-    if wanted is None and found == "z":
+    if choice is None and axis == "z":
         note(f"Z is up in {path}, as the person stands; it was turned (--up y leaves it)")
-    return stood_up(motion) if wanted == "z" or (wanted is None and found == "z") else motion
+    return stood_up(motion) if choice == "z" or (choice is None and axis == "z") else motion
 
 
 HUMAN_LEGS = (0.5, 1.3)
@@ -70,8 +69,7 @@ HUMAN_LEGS = (0.5, 1.3)
 
 
 def check_size(arguments: Namespace, path: Path, motion: Motion) -> None:
-    """Ask for the unit where bones are of no human length; a file of our own (.npz) or in a stated unit is believed."""
-
+    """Refuse bones of no human length without a unit; a file of our own (.npz) or with a unit is believed."""
     if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):
         return
     try:
@@ -99,6 +97,6 @@ def rate_assumed(arguments: Namespace, paths: list[Path]) -> bool:
 
 
 def note_rate(arguments: Namespace, paths: list[Path]) -> None:
-    """Say so on stderr."""
+    """Note a rate that is assumed."""
     if rate_assumed(arguments, paths):
         note(RATE_ASSUMED)

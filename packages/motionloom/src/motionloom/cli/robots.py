@@ -36,7 +36,7 @@ class RobotTarget(Target):
     header: bool = True
     figures: bool = False
     last: "list[tuple[Motion, Clip]]" = field(default_factory=list)
-    """What was made last, for a second file of the same motion."""
+    """The last clip and its motion, for a second file of the same motion."""
 
     @property
     def suffix(self) -> str | None:
@@ -57,12 +57,11 @@ class RobotTarget(Target):
         """No file of a robot is a character's with one more animation."""
         return False
 
-    def put(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
-        """The motion as it is, or on the uniform person where a map says which joints are which."""
-
+    def retarget(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
+        """The motion as it is, or on the uniform person where a map names its joints."""
         return motion if source_map is None else to_smpl22(motion, source_map)
 
-    def put_together(self, motions: Sequence[Motion]) -> list[Motion]:
+    def retarget_all(self, motions: Sequence[Motion]) -> list[Motion]:
         """Motions of one world, as they are."""
         return list(motions)
 
@@ -72,13 +71,13 @@ class RobotTarget(Target):
         from motionloom.robots.film import draw
 
         if path.suffix.lower() not in (*OUTS, *PICTURES):
-            return super().save(self.shown(motion, path), path, caption=caption)
+            return super().save(self.motion_for(motion, path), path, caption=caption)
         clip = self._clip_of(motion, path)
         if path.suffix.lower() in OUTS:
             return save_clip(clip, self.robot, path, header=self.header)
         return draw(self.robot, clip.qpos, clip.fps, path, caption=caption or "")
 
-    def shown(self, motion: Motion, path: Path) -> Motion:
+    def motion_for(self, motion: Motion, path: Path) -> Motion:
         """The robot's clip as motion of its skeleton; one that was read keeps its rate."""
         from motionloom.robots.body import to_motion
 
@@ -131,13 +130,13 @@ class RobotTarget(Target):
 
 
 def note_on_metres(metre: float) -> str:
-    """What goals on a robot are, of which ``metre`` is one of the person's that is drawn, for stderr."""
-    said = "goals are in the robot's metres"
-    return f"{said}; for the person that is generated, distances and speeds are {1 / metre:.2f} times as large"
+    """What goals on a robot are, of which ``metre`` is one of the generated person's, for stderr."""
+    units = "goals are in the robot's metres"
+    return f"{units}; for the person that is generated, distances and speeds are {1 / metre:.2f} times as large"
 
 
 def read_robot_target(arguments: Namespace) -> RobotTarget:
-    """What ``--robot`` and its options say."""
+    """The robot of ``--robot`` and its options."""
     from motionloom.robots.clip import FPS, check_settings
 
     refuse(arguments, ("skeleton", *OF_SKELETON), "is for characters; leave it out with --robot")
@@ -170,7 +169,6 @@ def opened(arguments: Namespace) -> "Robot":
 
 def reads_as_clip(arguments: Namespace, path: Path) -> bool:
     """Whether a file holds joint angles of a robot; refuses one where the line names no robot."""
-
     if path.suffix.lower() not in OUTS:
         return False
     from motionloom.robots.files import is_clip
@@ -224,29 +222,28 @@ def run_check(arguments: Namespace) -> int:
             source_map=arguments.source_map,
         )
     figures = measure(clip, robot, max_speed=arguments.max_speed)
-    found = figures.as_dict() | {"faults": figures.faults()}
+    report = figures.as_dict() | {"faults": figures.faults()}
     if arguments.physics:
         if len(clip) < 2:
             fail(f"{arguments.input} has one frame; --physics follows a clip of at least two")
-        found["physics"] = track(clip, robot).as_dict()
+        report["physics"] = track(clip, robot).as_dict()
     if arguments.json:
-        print(json.dumps({"file": str(arguments.input), **found}, indent=2))
+        print(json.dumps({"file": str(arguments.input), **report}, indent=2))
     else:
-        _print(found)
-    return 1 if found["faults"] else 0
+        _print(report)
+    return 1 if report["faults"] else 0
 
 
 def check_inputs(arguments: Namespace) -> int:
     """``motionloom export FILE --robot MODEL --check``: as `run_check`, in JSON; nothing is written."""
-
     if arguments.robot is None or len(arguments.inputs) != 1 or arguments.out is not None or arguments.mirror:
         fail("--check says how good a robot's clip is; give one file, its --robot, and no OUT")
     arguments.input, arguments.json, arguments.physics = arguments.inputs[0], True, False
     return run_check(arguments)
 
 
-def _print(found: dict) -> None:
-    for name, value in found.items():
+def _print(report: dict) -> None:
+    for name, value in report.items():
         if name == "physics":
             fell = f"falls after {value['free_seconds']:.2f} s" if value["fell"] else "does not fall"
             print(f"  {'root free':24} {fell}, {value['free_error']:.3f} rad off until then")
@@ -254,5 +251,5 @@ def _print(found: dict) -> None:
             print(f"  {'root held':24} {value['held_error']:.3f} rad off, {full:.0f} % of the time at full force")
         elif name != "faults":
             print(f"  {name.replace('_', ' '):24} {'-' if value is None else value}")
-    for fault in found["faults"]:
+    for fault in report["faults"]:
         print(f"  {'fault':24} {fault}")

@@ -1,4 +1,4 @@
-"""What the commands that make motions share: options, the checks of them, a progress bar, and files.
+"""What the commands that generate motions share: options, the checks of them, a progress bar, and files.
 
 Motions are written as they are finished, so that an interruption keeps those: one by one for every ``--count``, or
 piece by piece.
@@ -36,28 +36,26 @@ R = TypeVar("R")
 
 
 def sampling_of(arguments: Namespace) -> dict[str, Any]:
-    """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
+    """The settings of `Sampling` on the line, as keywords of a task; the others are the task's own."""
     names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance", "bodies", "best_of")
-    found: dict[str, Any] = {name: getattr(arguments, name, None) for name in names}
-    return {name: value for name, value in found.items() if value is not None}
+    settings: dict[str, Any] = {name: getattr(arguments, name, None) for name in names}
+    return {name: value for name, value in settings.items() if value is not None}
 
 
 def request_of(arguments: Namespace, request: type[R], own: Mapping[str, Any]) -> R:
-    """The request that the line says; own: values of fields that are said otherwise than by an option of their name."""
-    said = {name: getattr(arguments, name) for name in specs(request) if hasattr(arguments, name)}
-    return build_request(request, said | dict(own))
+    """The request of the line; own: values of fields that have no option of their name."""
+    options = {name: getattr(arguments, name) for name in specs(request) if hasattr(arguments, name)}
+    return build_request(request, options | dict(own))
 
 
 def results(label: str, plan: Plan, models: Models) -> Iterator[Result]:
-    """What a task makes, while a bar shows how far it is."""
-
+    """The results of a task, while a bar shows how far it is."""
     with bar(label) as progress:
         yield from run(plan, models, progress)
 
 
 def load_prior(arguments: Namespace) -> Prior:
     """The weights that the line names, with its adapters in them."""
-
     adapters = [parse_adapter(word) for word in arguments.adapter]
     return adapt(Prior.load(arguments.weights, device=arguments.device), adapters)
 
@@ -98,13 +96,13 @@ def places(outs: Sequence[Path], count: int, target: Target, *, sheets: bool = T
     return several
 
 
-def report(arguments: Namespace, about: dict[str, Any], written: Sequence[Path], seconds: float) -> None:
-    """Say what was written in ``seconds`` of drawing: a line each, or as JSON behind ``about``."""
+def report(arguments: Namespace, about: dict[str, Any], paths: Sequence[Path], seconds: float) -> None:
+    """Print what was written in ``seconds`` of sampling: a line each, or as JSON behind ``about``."""
     if arguments.json:
-        files = [str(path) for path in written]
+        files = [str(path) for path in paths]
         print(json.dumps(about | {"files": files, "sampling_seconds": round(seconds, 3)}, indent=1))
         return
-    for path in written:
+    for path in paths:
         print(f"wrote {path}")
 
 
@@ -123,13 +121,12 @@ def check_prompt(prompt: str) -> None:
 
 
 def remark_unknown(prior: Prior, prompts: Sequence[str]) -> list[str]:
-    """Say on stderr, a line each, which prompts are not English or like nothing learned; and give the lines."""
+    """Print on stderr, a line each, which prompts are not English or like nothing learned; and return the lines."""
     return list(unknown_words(prior, prompts).values())
 
 
 def unknown_words(prior: Prior, prompts: Sequence[str]) -> dict[str, str]:
     """The prompts that `remark_unknown` has a line for, with the line."""
-
     remarks = {one.text: one.line for one in remarks_on(prompts, prior.known, prior.text)}
     for line in remarks.values():
         say(line)
@@ -140,14 +137,14 @@ def unknown_words(prior: Prior, prompts: Sequence[str]) -> dict[str, str]:
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """A progress bar on a terminal's stderr, and a function that moves it: (done, of how many)."""
     if not sys.stderr.isatty():  # the bar would leave an empty line, and rich costs a tenth of a second
-        yield lambda done, total: None
+        yield lambda calls, total: None
         return
     from rich.console import Console
     from rich.progress import Progress
 
     with Progress(console=Console(file=unescaped(sys.stderr)), transient=True) as progress, escaping():
         task = progress.add_task(label, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+        yield lambda calls, total: progress.update(task, completed=calls, total=total)
 
 
 # The end of a motion generated again, so that its beginning can follow it: ``--loop``
@@ -162,7 +159,7 @@ def check_loop(arguments: Namespace, seconds: float) -> None:
 def check_loop_behind(arguments: Namespace, past: float, added: float, lost: str) -> None:
     """Refuse a ``--loop`` for which the ``added`` seconds behind a past are too short; else note what it changes.
 
-    past: seconds. lost: what is not as it was asked where the end is drawn anew, in words; empty where nothing is.
+    past: seconds. lost: what is not as requested where the end is generated anew, in words; empty where nothing is.
     """
     if not arguments.loop:
         return
@@ -176,13 +173,13 @@ def check_loop_behind(arguments: Namespace, past: float, added: float, lost: str
 
 
 def note_loop(arguments: Namespace, lost: str) -> None:
-    """Say on stderr what is ``lost`` where the end is drawn anew, if anything is."""
+    """Note what is ``lost`` where the end is generated anew, if anything is."""
     if arguments.loop and lost:
         note(f"the last {arguments.blend:g} s are generated again for --loop; {lost}")
 
 
 def looped(arguments: Namespace, prior: Prior, motion: Motion, text: str, *, seed: int) -> Motion:
-    """The motion with its end drawn anew so that the beginning can follow it, where the line says ``--loop``.
+    """The motion with its end generated anew so that the beginning can follow it, where the line says ``--loop``.
 
     text: what the person does there; without it ``--guidance`` is of no use to the prior.
     """
@@ -199,41 +196,41 @@ def looped(arguments: Namespace, prior: Prior, motion: Motion, text: str, *, see
 # Files that are written as their motions are finished
 
 
-Made = TypeVar("Made")
-"""What is made ``--count`` times: a motion, or the motions of two people."""
-Write = Callable[[Sequence[Made], list[list[Path]], int], object]
+Item = TypeVar("Item")
+"""One of ``--count``: a motion, or the motions of two people."""
+Write = Callable[[Sequence[Item], list[list[Path]], int], object]
 """(what comes next, its files for each ``--out``, the number of its first): write it."""
 
 
 @dataclass(eq=False)
-class Finished(Generic[Made]):
-    """What is finished, and the files that are in their places; a picture that shows several is drawn at the end."""
+class Finished(Generic[Item]):
+    """What is finished, and the files that are in their places; a picture of several is drawn at the end."""
 
     files: Sequence[Sequence[Path]]
     """For each ``--out`` a file each, or one that shows them all."""
     total: int
-    """How many were asked for."""
-    write: Write[Made]
-    put: Callable[[Sequence[Made]], Sequence[Made]] = lambda made: made
-    """What is done to them before they are written, such as putting them on a skeleton."""
+    """``--count``."""
+    write: Write[Item]
+    convert: Callable[[Sequence[Item]], Sequence[Item]] = lambda items: items
+    """Applied to them before they are written, such as putting them on a skeleton."""
     what: str = "motions"
     """What they are called in a message."""
     count: int = 0
     """How many are finished."""
     sampling: float = 0.0
-    """Seconds of drawing."""
+    """Seconds of sampling."""
     happened: list[list[dict[str, Any] | None]] = field(default_factory=list)
     """What each person of each one did (`motionloom.kinematics.deeds`), where that is printed."""
     _files: dict[Path, None] = field(default_factory=dict)
-    _shown: list[Made] = field(default_factory=list)
+    _items: list[Item] = field(default_factory=list)
 
     @property
-    def written(self) -> list[Path]:
+    def paths(self) -> list[Path]:
         """Files that are in their places, by ``--out``."""
         return [file for several in self.files for file in several if file in self._files]
 
-    def take(self, makers: Iterable[Sequence[Made]], *, measured: bool = False) -> bool:
-        """Write what ``makers`` give, in order, as it comes; true if that was interrupted after some was finished.
+    def take(self, makers: Iterable[Sequence[Item]], *, measured: bool = False) -> bool:
+        """Write what ``makers`` yield, in order, as it comes; true if that was interrupted after some was finished.
 
         measured: measure what happened.
         """
@@ -256,7 +253,7 @@ class Finished(Generic[Made]):
         return False
 
     def ended(self, interrupted: bool) -> int:
-        """The exit code; says what was finished if it was interrupted."""
+        """The exit code; reports what was finished if it was interrupted."""
         if not interrupted:
             return 0
         say(f"interrupted; {self.count} of {self.total} {self.what} were finished")
@@ -265,44 +262,44 @@ class Finished(Generic[Made]):
     def _shows_all(self, several: Sequence[Path]) -> bool:
         return len(several) < self.total
 
-    def _add(self, some: Sequence[Made]) -> None:
+    def _add(self, some: Sequence[Item]) -> None:
         """Write what comes next, all of it, before an interruption takes effect."""
         with held_back():
-            some = self.put(some)
+            some = self.convert(some)
             first, self.count = self.count, self.count + len(some)
-            self._shown += some if any(map(self._shows_all, self.files)) else ()
+            self._items += some if any(map(self._shows_all, self.files)) else ()
             places = [list(several[first : self.count]) for several in self.files if not self._shows_all(several)]
             if places:
                 self.write(some, places, first)
             self._files |= dict.fromkeys(file for several in places for file in several)
 
     def _finish(self) -> None:
-        """Draw what shows several, those that are finished."""
+        """Write what shows several, those that are finished."""
         with held_back():
             places = [list(several) for several in self.files if self._shows_all(several)]
             if self.count and places:
-                self.write(self._shown, places, 0)
+                self.write(self._items, places, 0)
                 self._files |= dict.fromkeys(file for several in places for file in several)
 
 
 def finished_motions(
     files: Sequence[Sequence[Path]], captions: Sequence[str], target: Target, rate: float | None, *, first: bool = False
 ) -> Finished[Motion]:
-    """Motions of these captions that are to be finished, put on the target's skeleton, and written to these files.
+    """Motions of these captions that are to be finished, retargeted, and written to these files.
 
-    rate: frames per second, None: as they are sampled; first: they get it before they are put on the skeleton.
+    rate: frames per second, None: as they are sampled; first: they get it before they are retargeted.
     """
     names = target.names(captions)
 
-    def written(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
+    def write(motions: Sequence[Motion], places: list[list[Path]], first: int) -> None:
         for several in places:
             target.save_all(motions, several, names[first : first + len(motions)])
 
-    def put(motions: Sequence[Motion]) -> list[Motion]:
-        moved = map(target.put, at_rate(motions, rate) if first else motions)
+    def convert(motions: Sequence[Motion]) -> list[Motion]:
+        moved = map(target.retarget, at_rate(motions, rate) if first else motions)
         return list(moved) if first else at_rate(moved, rate)
 
-    return Finished(files, len(names), written, put)
+    return Finished(files, len(names), write, convert)
 
 
 def write_pieces(pieces: Iterable[Motion], streams: Sequence[Stream]) -> None:

@@ -1,4 +1,4 @@
-"""`motionloom serve` and `motionloom studio`: motion over HTTP, and the page that draws it."""
+"""`motionloom serve` and `motionloom studio`: motion over HTTP, and the page that shows it."""
 
 import os
 from argparse import Namespace
@@ -49,7 +49,7 @@ def run_mcp(arguments: Namespace) -> None:
 
 
 def _checked(arguments: Namespace) -> "tuple[Applied, ...]":
-    """The adapters of the command line, once what it says is checked, before anything is started."""
+    """The adapters of the command line, checked before anything is started."""
     from motionloom.goals.adapters import parse_adapter
 
     if arguments.threads is not None and not 1 <= arguments.threads <= 1024:
@@ -69,7 +69,7 @@ def _set_threads(arguments: Namespace) -> None:
 
 
 def _leave_a_core() -> None:
-    """The networks get one thread less than there are cores, unless the user has said how many.
+    """The networks get one thread less than there are cores, unless the user has set how many.
 
     With a thread on every core each layer waits for the one whose core draws the page's pictures: on two cores a draw
     of 10 s took 8.8 s beside a browser without a GPU, and 1.7 s so (docs/decisions/0023).

@@ -34,7 +34,7 @@ from motionloom.skeleton import SMPL22, Skeleton
 
 @dataclass(frozen=True)
 class Target:
-    """A skeleton that motions are put on, and how its own file says things; or none: they keep their own."""
+    """A skeleton for motions, with the conventions of its own file; or none: motions keep their own."""
 
     name: str = ""
     skeleton: Skeleton | None = None
@@ -43,7 +43,7 @@ class Target:
     orders: dict[str, str] = field(default_factory=dict)
     character: Character | None = None
     at: str | None = None
-    """Where motions start: character or origin; None: where the character stands, if that is not the origin."""
+    """Where motions start: character or origin; None: where the character is, if that is not the origin."""
     root: RootMode = "motion"
     hands: HandPose = "as-is"
     joint_map: Path | None = None
@@ -57,26 +57,26 @@ class Target:
         """The target of a motion whose own BVH has this unit and these orders, which it keeps with its skeleton."""
         return self if self.skeleton else replace(self, unit=self.unit or unit, orders=orders)
 
-    def put(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
-        """The motion on this skeleton, where the character stands; ``source`` names it in an error."""
+    def retarget(self, motion: Motion, *, source: str = "the motion", source_map: Path | None = None) -> Motion:
+        """The motion on this skeleton, where the character is; ``source`` names it in an error."""
         if self.skeleton is None:
             return motion
         place = self.place
         if place is None or (self.at is None and shares_world(motion, self.skeleton)):
-            return self._put(motion, lambda made, body: made, source, source_map)
-        return self._put(motion, lambda made, body: started(made, body, place), source, source_map)
+            return self._retarget(motion, lambda own, body: own, source, source_map)
+        return self._retarget(motion, lambda own, body: started(own, body, place), source, source_map)
 
-    def put_together(self, motions: Sequence[Motion]) -> list[Motion]:
-        """Motions of one world, each on this skeleton, the world's origin where the character stands."""
+    def retarget_all(self, motions: Sequence[Motion]) -> list[Motion]:
+        """Motions of one world, each on this skeleton, the world's origin where the character is."""
         if self.skeleton is None:
             return list(motions)
         world = self.place or HERE
         return [
-            self._put(motion, lambda made, body: made if world == HERE else moved(made, body, world))
+            self._retarget(motion, lambda own, body: own if world == HERE else moved(own, body, world))
             for motion in motions
         ]
 
-    def _put(
+    def _retarget(
         self,
         motion: Motion,
         move: Callable[[Motion, Body], Motion],
@@ -85,12 +85,12 @@ class Target:
     ) -> Motion:
         assert self.skeleton is not None
         try:
-            made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map)
+            own = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map)
         except MotionloomError as error:
             hint = "--source-map or --target-map"
             raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
         body = self.body
-        return pose_hands(place_root(move(bend_toes(made, body), body), body, self.root), self.hands, self.joint_map)
+        return pose_hands(place_root(move(bend_toes(own, body), body), body, self.root), self.hands, self.joint_map)
 
     @property
     def body(self) -> Body:
@@ -101,7 +101,6 @@ class Target:
     @property
     def place(self) -> GroundPose | None:
         """Where motions are to start; None: where they do."""
-
         if self.character is None:
             return None
         if self.at == "origin":
@@ -110,8 +109,7 @@ class Target:
         return own if self.at == "character" or own != HERE else None
 
     def from_motion(self, motion: Motion) -> GroundPose:
-        """Where the world of a uniform person's motion, at this size, is in the world of what `put` makes of it."""
-
+        """Where the world of a uniform person's motion, at this size, is in the world of what `retarget` returns."""
         place = self.place
         return HERE if place is None else world_of(ground_pose(motion.thinned(1).positions()[0] * self.size), place)
 
@@ -156,7 +154,7 @@ class Target:
         return list(several or captions)
 
     def save(self, motion: Motion, path: Path, *, caption: str | None = None) -> Path:
-        """Write a motion that is `put` on the skeleton; the suffix picks the format.
+        """Write a motion that is on the skeleton; the suffix picks the format.
 
         ``caption`` labels a picture, and is the animation's name where the line gives none.
         """
@@ -175,17 +173,19 @@ class Target:
         return io.save(motion, path, captions=None if caption is None else [caption])
 
     def save_all(self, motions: Sequence[Motion], files: Sequence[Path], captions: Sequence[str]) -> list[Path]:
-        """Write motions that are `put` on the skeleton into the files of one ``--out``, one each or one for all."""
+        """Write motions that are on the skeleton into the files of one ``--out``, one each or one for all."""
         if self.holds_all(files[0]):
             return [self.save_clips(motions, files[0], self.names(captions))]
         if len(files) == len(motions):
-            return [self.save(one, file, caption=said) for one, file, said in zip(motions, files, captions)]
+            return [self.save(one, file, caption=caption) for one, file, caption in zip(motions, files, captions)]
         if self.plays_in(files[0]):
-            return [self._save_page([(said, [one]) for said, one in zip(captions, motions, strict=True)], files[0])]
+            return [
+                self._save_page([(caption, [one]) for caption, one in zip(captions, motions, strict=True)], files[0])
+            ]
         return [io.save(list(motions), files[0], captions=captions)]
 
     def save_together(self, people: Sequence[Motion], path: Path, caption: str) -> Path:
-        """Write two people who were `put_together` into one file."""
+        """Write two people who were `retarget_all` into one file."""
         if self.plays_in(path):
             return self._save_page([(caption, people)], path)
         return io.save_scene(people, path, names=["first", "second"], captions=[caption] * 2)
@@ -197,14 +197,14 @@ class Target:
             return open_stream(path, total=total, fps=fps, caption=caption, joints=joints, order=self.orders, unit=unit)
         check_length(path, total=total, fps=fps, joints=len(self.skeleton))
         self.names([caption])
-        return Kept(path, lambda whole: self.save(self.put(whole), path, caption=caption))
+        return Kept(path, lambda whole: self.save(self.retarget(whole), path, caption=caption))
 
-    def shown(self, motion: Motion, path: Path) -> Motion:
-        """A motion that is `put` on the skeleton, as a file that holds poses gets it."""
+    def motion_for(self, motion: Motion, path: Path) -> Motion:
+        """A motion that is on the skeleton, as a file of poses gets it."""
         return motion
 
     def summary(self) -> str:
-        """What the file that was written last holds, where that is not the motion as it was put; else empty."""
+        """What the file that was written last holds, where that is not the motion itself; else empty."""
         return ""
 
     def plays_in(self, path: Path) -> bool:
@@ -218,7 +218,7 @@ class Target:
         return write_page([Take(name, people) for name, people in takes], path, character=self.character)
 
     def save_clips(self, motions: Sequence[Motion], path: Path, names: Sequence[str]) -> Path:
-        """Write motions that are `put` on the skeleton as animations of the character's own file."""
+        """Write motions that are on the skeleton as animations of the character's own file."""
         assert self.character is not None
         return self._save_own(self.character, list(zip(motions, names, strict=True)), path)
 
@@ -232,15 +232,15 @@ class Target:
         if ".glb" not in character.suffixes:
             fail(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
         with tempfile.TemporaryDirectory() as folder:
-            made = character.save_clips(clips, Path(folder) / "moving.glb", replace=self.replace)
+            glb = character.save_clips(clips, Path(folder) / "moving.glb", replace=self.replace)
             try:
-                return glb_to_fbx(made, path, fps=clips[0][0].fps)
+                return glb_to_fbx(glb, path, fps=clips[0][0].fps)
             except MotionloomError as error:
-                raise MotionloomError(str(error).replace(str(made), str(character.path))) from None
+                raise MotionloomError(str(error).replace(str(glb), str(character.path))) from None
 
 
 def own_outs(arguments: Namespace, name: str) -> list[Path]:
-    """What is written where the line does not say: ``name`` as a BVH, or as the character is."""
+    """The files to write where the line names none: ``name`` as a BVH, or as the character is."""
     if arguments.robot is not None:
         return [Path(name + ".csv")]
     own = Path(arguments.skeleton or "").suffix.lower()
@@ -248,7 +248,7 @@ def own_outs(arguments: Namespace, name: str) -> list[Path]:
 
 
 OF_SKELETON = ("root", "hands", "at", "clip_name", "replace", "one_file", "target_map")
-"""Options that say how motions are put on a skeleton."""
+"""Options of how motions are put on a skeleton."""
 
 
 def refuse(arguments: Namespace, names: Sequence[str], why: str) -> None:
@@ -259,7 +259,7 @@ def refuse(arguments: Namespace, names: Sequence[str], why: str) -> None:
 
 
 def read_target(arguments: Namespace, outs: Sequence[Path]) -> Target:
-    """What the line says that motions are put on; refuses options and files that do not go with it."""
+    """The skeleton of the line for motions; refuses options and files that do not go with it."""
     if arguments.robot is not None:
         from motionloom.cli.robots import read_robot_target
 
@@ -270,27 +270,28 @@ def read_target(arguments: Namespace, outs: Sequence[Path]) -> Target:
         refuse(arguments, OF_SKELETON, "goes with a --skeleton; name one")
         _note_mannequin(arguments, outs)
         return Target(unit=arguments.out_unit)
-    found = _find(arguments)
-    found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
-    _check_humanoid(found)
-    if found.character is not None:
-        path = Path(found.name)
-        own = arguments.clip_name or arguments.replace or found.one_file
-        if own and not any(found.writes(out) or not out.suffix for out in outs):
+    target = _find(arguments)
+    if arguments.out_unit is not None:
+        target = replace(target, unit=arguments.out_unit)
+    _check_humanoid(target)
+    if target.character is not None:
+        path = Path(target.name)
+        own = arguments.clip_name or arguments.replace or target.one_file
+        if own and not any(target.writes(out) or not out.suffix for out in outs):
             fail(f"--clip-name, --replace and --one-file are for the character's own file, a {path.suffix}")
         for out in outs:
-            if out.suffix.lower() == ".glb" and not found.writes(out):
+            if out.suffix.lower() == ".glb" and not target.writes(out):
                 fail(f"{out} cannot contain the character; give a name that ends in {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
                 fail(f"{out} is the character itself; give the moving one another name with --out")
-        _note_place(found)
-    elif arguments.clip_name or arguments.replace or arguments.at or found.one_file:
-        fail(f"--clip-name, --replace, --one-file and --at are for .glb, .gltf and .vrm characters; got {found.name}")
-    return found
+        _note_place(target)
+    elif arguments.clip_name or arguments.replace or arguments.at or target.one_file:
+        fail(f"--clip-name, --replace, --one-file and --at are for .glb, .gltf and .vrm characters; got {target.name}")
+    return target
 
 
 def _note_place(target: Target) -> None:
-    """Say where motions start, where the line does not and it is not the origin."""
+    """Note where motions start, where the line does not name it and it is not the origin."""
     if target.at is None and target.place is not None:
         place = target.place
         note(
@@ -300,15 +301,15 @@ def _note_place(target: Target) -> None:
 
 
 def _note_mannequin(arguments: Namespace, outs: Sequence[Path]) -> None:
-    """Say that a character whose motion is read does not come out itself."""
+    """Note that a character whose motion is read does not come out itself."""
     source = next((getattr(arguments, name) for name in ("inputs", "clip", "past") if hasattr(arguments, name)), None)
     source = source[0] if isinstance(source, list) else source
     bodies = [out for out in outs if out.suffix.lower() in (".glb", ".usda", ".fbx")]
     if not isinstance(source, Path) or source.suffix.lower() not in characters(alone=True) or not bodies:
         return
 
-    found = open_glb(source).document.json
-    if found.get("meshes") and found.get("asset", {}).get("generator") != "motionloom":
+    gltf = open_glb(source).document.json
+    if gltf.get("meshes") and gltf.get("asset", {}).get("generator") != "motionloom":
         note(f"{bodies[0]} gets a simple body; --skeleton {source} writes that character with one more animation")
 
 
@@ -329,7 +330,6 @@ def _check_humanoid(target: Target) -> None:
 
 
 def _find(arguments: Namespace) -> Target:
-
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
     options = {

@@ -21,7 +21,6 @@ TRAINING = "motionloom_train.convert"
 
 def run_weights(arguments: Namespace) -> None:
     """``motionloom weights NAME``."""
-
     if arguments.weights[:1] == ["convert"]:
         _convert(arguments)
         return
@@ -43,14 +42,13 @@ def run_weights(arguments: Namespace) -> None:
         if not described:
             print("no weights ship with this installation; name a file")
         return
-    [asked] = arguments.weights
-    about = describe(names.get(asked) or find_weights(asked), asked if asked in names else None)
+    [name] = arguments.weights
+    about = describe(names.get(name) or find_weights(name), name if name in names else None)
     print(json.dumps(about, indent=1) if arguments.json else _card(about))
 
 
 def _convert(arguments: Namespace) -> None:
     """Write an older file again with graphs; raises MotionloomError where it cannot be, or PyTorch is missing."""
-
     if len(arguments.weights) != 3 or arguments.actions or arguments.json:
         fail("say which file to read and which to write: motionloom weights convert OLD NEW.safetensors")
     old, new = map(Path, arguments.weights[1:])
@@ -65,8 +63,7 @@ def _convert(arguments: Namespace) -> None:
 
 
 def _actions(arguments: Namespace) -> None:
-    """Print what a prior has learned; raises MotionloomError for weights that do not say."""
-
+    """Print what a prior has learned; raises MotionloomError for weights without it."""
     weights = arguments.weights[0] if arguments.weights else "default"
     known = Prior.load(weights).known
     if known is None:
@@ -84,16 +81,15 @@ def _actions(arguments: Namespace) -> None:
 
 
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
-    """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
-
+    """What a weight file is and holds; the whole file is read and checked. ``name``: the shipped one."""
     kinds = ((PREDICTORS, _predictor), (PAIRS, _block), (ADAPTERS, _adapter))
-    said = next((read for kind, read in kinds if kind.signed(path)), _prior)(path)
-    about = {"name": said["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | said
+    facts = next((read for kind, read in kinds if kind.signed(path)), _prior)(path)
+    about = {"name": facts["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | facts
     return about if name is None else about | {"name": name}
 
 
 def _about(whole: Any, kind: str, variant: str, tensors: Mapping[str, Any], *, own: dict[str, Any]) -> dict[str, Any]:
-    """What is said of every kind of weights, and its ``own``; whole: what has their name, licence, data and notes."""
+    """The facts of every kind of weights, and its ``own``; whole: what has their name, licence, data and notes."""
     return {
         "name": whole.name,
         "kind": kind,

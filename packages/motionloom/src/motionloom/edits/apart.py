@@ -122,11 +122,11 @@ def _slow(frames: int, at: NDArray[np.intp], line: Array, need: Array, rest: NDA
     """(frames, 2) metres: the curve that goes ``need`` along ``line`` at some frames, and nowhere at ``rest``."""
     where = np.concatenate([at, rest, rest])
     ways = np.concatenate([line, *(np.tile(axis, (len(rest), 1)) for axis in np.eye(2))])
-    asked = np.concatenate([need, np.zeros(2 * len(rest))])
+    values = np.concatenate([need, np.zeros(2 * len(rest))])
     lag = np.arange(frames)[:, None] - where
     covariance = COMMON**2 + SLOW**2 * np.exp(-0.5 * (lag / WIDTH) ** 2)
     inner = covariance[where] * (ways @ ways.T)
     inner[np.diag_indices_from(inner)] += np.where(np.arange(len(where)) < len(at), LOOSE, 1e-3) ** 2
-    curve = covariance @ (np.linalg.solve(inner, asked)[:, None] * ways)
+    curve = covariance @ (np.linalg.solve(inner, values)[:, None] * ways)
     curve *= (need.max() / np.linalg.norm(curve, axis=-1, keepdims=True).clip(1e-9)).clip(max=1.0)
     return np.asarray(curve, dtype=np.float64)

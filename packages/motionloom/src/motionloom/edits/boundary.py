@@ -65,21 +65,21 @@ def match_boundary(
     return value * lack + change * over * slope
 
 
-def match_rotations(made: Array, known: Array, border: int, step: int, frames: int) -> Array:
+def match_rotations(turns: Array, known: Array, border: int, step: int, frames: int) -> Array:
     """Rotations with the frames beside a boundary turned, so that neither direction nor angular velocity jumps.
 
     Args:
-        made: (frames, joints, 4) unit quaternions, which stay but for the frames beside the boundary.
+        turns: (frames, joints, 4) unit quaternions, which stay but for the frames beside the boundary.
         known: the same, or more or fewer frames; read at ``border`` and one frame further from what is sampled.
         border: the last known frame.
         step: 1: what is sampled follows it; -1: it comes before.
         frames: over how many frames the difference dies down.
     """
     beside = [at for at in (border - step, border) if 0 <= at < len(known)]
-    lack = rot.quat_to_rotvec(rot.multiply(known[beside], rot.inverse(made[beside])))
+    lack = rot.quat_to_rotvec(rot.multiply(known[beside], rot.inverse(turns[beside])))
     slope = lack[1] - lack[0] if len(lack) == 2 else np.zeros_like(lack[0])
-    at, result = border + step * np.arange(1, frames + 1), made.copy()
-    result[at] = rot.multiply(rot.rotvec_to_quat(match_boundary(lack[-1], slope, frames)), made[at])
+    at, result = border + step * np.arange(1, frames + 1), turns.copy()
+    result[at] = rot.multiply(rot.rotvec_to_quat(match_boundary(lack[-1], slope, frames)), turns[at])
     return result
 
 
@@ -106,7 +106,7 @@ def arrival(known: np.ndarray, mask: np.ndarray, window: InpaintWindow) -> Calla
         if window.place:
             turn, root = humanml.recover_root(bent)
             lacking = goal - root[:, last]
-            # velocities are given in the heading of the frame they lead to
+            # velocities are given in the heading of the frame behind them
             w, y = turn[:, first + 1 : last + 1, 0], turn[:, first + 1 : last + 1, 2]
             c, s = 1 - 2 * y * y, 2 * w * y
             x, z = lacking[:, None, 0], lacking[:, None, 2]
@@ -121,7 +121,7 @@ def joining(known: np.ndarray, mask: np.ndarray, first: int, last: int) -> Calla
     """A function that bends the free numbers so that they leave the known ones, and come to them, without a jump.
 
     On features (rows, frames, 263), not standardised; ``mask`` is True at known ones, the stretch is ``first`` to
-    before ``last``. At each border its first frame becomes what the two known frames beside it lead to, in value and
+    before ``last``. At each border its first frame continues the two known frames beside it, in value and
     in change; the difference fades over `JOIN` frames as a cubic.
     """
     frames = known.shape[1]

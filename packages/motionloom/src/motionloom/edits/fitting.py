@@ -1,7 +1,7 @@
 """Fitting: a sampled motion is bent, as little and as smoothly as it takes, until it meets a goal.
 
-One least-squares problem over the turns of the joints and the place of the root, solved by Gauss and Newton: what is
-asked, feet that stay where they stand, small changes, small accelerations of the changes. Neighbouring frames are
+One least-squares problem over the turns of the joints and the place of the root, solved by Gauss and Newton: the
+targets, feet that stay where they are, small changes, small accelerations of the changes. Neighbouring frames are
 coupled by the last term alone, so each step is one block-tridiagonal system and time is linear in length.
 Bones keep their lengths because only turns change.
 """
@@ -33,7 +33,7 @@ EXACT, STANDING, SWINGING = 0.0005, 0.001, 0.02
 SLOW = 30.0
 """Frames squared: a change as large as allowed costs as much as one that accelerates by that share of it per frame²."""
 STEPS = 12
-_DONE = 1e-4
+_TOLERANCE = 1e-4
 """Metres: no target gets nearer by more in the last step."""
 
 _BALLS, _HINGES = costs.by_number(costs.BALL_TURN), costs.by_number(costs.HINGE_TURN)
@@ -69,7 +69,7 @@ def fit(motion: Motion, goal: Goal) -> Motion:
     if not goal.mask.any():
         return motion
     places = motion.positions()
-    if np.abs(np.where(goal.mask, goal.positions - places, 0.0)).max() < _DONE:
+    if np.abs(np.where(goal.mask, goal.positions - places, 0.0)).max() < _TOLERANCE:
         return motion
     shift = _root_shift(places, goal)
     goal = replace(goal, positions=_in_reach(places + shift[:, None], goal))
@@ -85,7 +85,7 @@ def fit(motion: Motion, goal: Goal) -> Motion:
     return replace(motion, root=root, rotations=rotations)
 
 
-# What is asked
+# Targets
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class _Targets:
     places: Array
     """(frames, joints, 3) metres."""
     weights: Array
-    """(frames, joints, 3) 1 / standard deviation; 0 where nothing is asked."""
+    """(frames, joints, 3) 1 / standard deviation; 0 where there is no target."""
 
     def crop(self, part: slice) -> "_Targets":
         return _Targets(self.joints, self.places[part], self.weights[part])
@@ -104,24 +104,24 @@ class _Targets:
 
 def _targets(goal: Goal, part: slice) -> _Targets:
     joints = np.flatnonzero(goal.mask[part].any(axis=(0, 2)))
-    asked = goal.mask[part][:, joints]
-    return _Targets(tuple(joints.tolist()), np.where(asked, goal.positions[part][:, joints], 0.0), asked / EXACT)
+    mask = goal.mask[part][:, joints]
+    return _Targets(tuple(joints.tolist()), np.where(mask, goal.positions[part][:, joints], 0.0), mask / EXACT)
 
 
 def _windows(goal: Goal) -> Iterator[tuple[int, int]]:
     """Stretches of frames around targets."""
-    asked = goal.mask.any(axis=(1, 2)).astype(float)
-    yield from true_spans(np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
+    busy = goal.mask.any(axis=(1, 2)).astype(float)
+    yield from true_spans(np.convolve(busy, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
 
 
 def _in_reach(places: Array, goal: Goal) -> Array:
     """(frames, 22, 3) the targets, those out of reach brought as near to the body as it can follow them."""
     result = goal.positions.copy()
     for joint, base, length in _chains():
-        base_asked = goal.mask[:, base].any(axis=-1, keepdims=True)
+        base_mask = goal.mask[:, base].any(axis=-1, keepdims=True)
         centre = np.where(goal.mask[:, base], goal.positions[:, base], places[:, base])
         line = np.where(goal.mask[:, joint], goal.positions[:, joint] - centre, 0.0)
-        longest = _STRETCH * length + np.where(base_asked, 0.0, _LEAN)
+        longest = _STRETCH * length + np.where(base_mask, 0.0, _LEAN)
         share = np.minimum(1.0, longest / np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9))
         far = (share < 1) & goal.mask[:, joint]
         result[:, joint] = np.where(far, centre + line * share, result[:, joint])
@@ -170,16 +170,16 @@ _LARGE = 0.5
 def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Targets:
     """Where the feet go when the body goes by ``shift``: through every stance by the mean of it."""
     planted = planted_feet(places, fps)
-    wanted = places[:, list(FEET)].copy()
+    targets = places[:, list(FEET)].copy()
     weights = np.where(planted, 1 / STANDING, 1 / SWINGING)
     for side in (slice(0, 2), slice(2, 4)):
-        wanted[:, side] += carried(shift, planted[:, side].max(axis=1))[:, None]
+        targets[:, side] += carried(shift, planted[:, side].max(axis=1))[:, None]
     near = np.ones(13)
     for joint, columns in _FEET_OF.items():
-        asked = np.convolve(goal.mask[:, joint].any(axis=-1), near)[6:-6] > 0.5
+        free = np.convolve(goal.mask[:, joint].any(axis=-1), near)[6:-6] > 0.5
         for column in columns:
-            weights[:, column] = np.where(asked, 1e-3 / SWINGING, weights[:, column])
-    return _Targets(FEET, wanted, np.repeat(weights[..., None], 3, axis=-1))
+            weights[:, column] = np.where(free, 1e-3 / SWINGING, weights[:, column])
+    return _Targets(FEET, targets, np.repeat(weights[..., None], 3, axis=-1))
 
 
 # The pose and its derivatives
@@ -208,7 +208,7 @@ class _Pose:
         rotations[:, list(_HINGES)] = rot.multiply(rotations[:, list(_HINGES)], rot.rotvec_to_quat(hinges))
         return self.root + self.change[:, :3] * _ROOT, rotations
 
-    def seen(self) -> tuple[Array, Array]:
+    def places_and_world(self) -> tuple[Array, Array]:
         """Places (frames, 22, 3) and world matrices (frames, 22, 3, 3)."""
         root, rotations = self.posed()
         local = rot.quat_to_matrix(rotations)
@@ -285,12 +285,12 @@ def _bends(places: Array, world: Array) -> Array:
 def _solved(pose: _Pose, targets: list[_Targets], bands: Array) -> Array:
     """(frames, columns) the change that meets the targets best."""
     sampled = replace(pose, change=np.zeros_like(pose.change))
-    bent = _bends(*sampled.seen())
+    bent = _bends(*sampled.places_and_world())
     low, high = ((limit(bent, b) - bent) / list(_HINGES.values()) for limit, b in zip((np.minimum, np.maximum), _BEND))
     damping, best, cost = 1e-3, pose.change, np.inf
     last = np.inf
     for _ in range(STEPS):
-        places, world = pose.seen()
+        places, world = pose.places_and_world()
         now, off = _cost(pose, places, targets, bands)
         if now > cost:
             damping *= 10
@@ -298,9 +298,9 @@ def _solved(pose: _Pose, targets: list[_Targets], bands: Array) -> Array:
             if damping > 1e3:
                 break
             continue
-        done = cost - now < 1e-3 * now and abs(last - off) < _DONE
+        settled = cost - now < 1e-3 * now and abs(last - off) < _TOLERANCE
         best, cost, last, damping = pose.change, now, off, damping / 3
-        if done:
+        if settled:
             break
         axes = pose.axes(world)
         blocks, slope = np.zeros((len(places), _COLUMNS, _COLUMNS)), np.zeros_like(pose.change)

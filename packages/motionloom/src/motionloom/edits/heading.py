@@ -31,7 +31,7 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
     takes `SOONEST` to `LONGEST` frames. How long, and which of two ways round, the first estimate decides.
     """
     mean, spread = prior.mean.astype(np.float64), prior.spread.astype(np.float64)
-    before: list[float] = []  # the turn that was made of the estimate before
+    before: list[float] = []  # the turn of the estimate before
     over: list[float] = []
 
     def correct(denoised: np.ndarray, level: int) -> np.ndarray:

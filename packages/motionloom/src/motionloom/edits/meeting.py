@@ -1,6 +1,6 @@
 """Two people who are sampled meet: they come near each other, and their hands to one place.
 
-What the words ask (`goals.contact`) has no time and no place. Both are found in the first estimate that is sure enough:
+The contact in the words (`goals.contact`) has no time and no place. Both are found in the first estimate that is sure:
 the frame in which what shall meet is nearest already. From then on every estimate is changed: the relative pose so that
 both reach, then the arms, as any other goal does (`steering`). What is left is fitted when all is sampled (`met`).
 """
@@ -81,8 +81,8 @@ class Meeting:
             return pair
         now = pair.ways()[:, self.frame]
         there = relative(now[0], now[1])
-        asked = np.stack([[1.0, 0.0, 0.0, 0.0], self._there(there)])
-        change = lacking(now[None], asked[None], shares)[0]
+        target = np.stack([[1.0, 0.0, 0.0, 0.0], self._there(there)])
+        change = lacking(now[None], target[None], shares)[0]
         frames = pair.features.shape[1]
         share = np.ones(frames)
         if self.still:
@@ -93,26 +93,26 @@ class Meeting:
         """The second person's ground pose as the first sees it, (4,), changed as little as it takes."""
         c, s, x, z = there
         distance = float(np.hypot(x, z))
-        wanted = float(np.clip(distance, *self.contact.apart))
+        target = float(np.clip(distance, *self.contact.apart))
         if self.contact.turn == "facing":
-            return np.array([-1.0, 0.0, -2 * LEFT_OF if self.contact.close else 0.0, wanted])
+            return np.array([-1.0, 0.0, -2 * LEFT_OF if self.contact.close else 0.0, target])
         if self.contact.turn == "beside":
             side = -1.0 if self.way[0].joint == RIGHT else 1.0
-            return np.array([1.0, 0.0, side * wanted, 0.0])
-        scale = wanted / max(distance, 1e-6)
+            return np.array([1.0, 0.0, side * target, 0.0])
+        scale = target / max(distance, 1e-6)
         return np.array([c, s, x * scale, z * scale])
 
     def goals(self, places: Array) -> tuple[Goal, Goal]:
-        """What each is asked, in the world of places (2, frames, 22, 3) metres."""
+        """The goals of each, in the world of places (2, frames, 22, 3) metres."""
         frames = places.shape[1]
         goals = Goal.nothing(frames), Goal.nothing(frames)
         if self.frame is None:
             return goals
         at = np.arange(*self._span(frames))
-        stands = self._stands(places[:, at]) if self.contact.close else None
+        poses = self._embrace(places[:, at]) if self.contact.close else None
         for touch in self.way:
             if touch.beside is not None:
-                _ask(goals[touch.person], at, touch.joint, self._beside(touch, places[1 - touch.person, at], stands))
+                _ask(goals[touch.person], at, touch.joint, self._beside(touch, places[1 - touch.person, at], poses))
                 continue
             ends = places[0, at, touch.joint], places[1, at, touch.other]
             if not all(self.free):  # a hand of somebody given is reached for only where such hands meet
@@ -123,9 +123,9 @@ class Meeting:
             point, across = self._point(places[:, at], ends)
             _ask(goals[0], at, touch.joint, point - GAP / 2 * across)
             _ask(goals[1], at, touch.other, point + GAP / 2 * across)
-        for goal, stand in zip(goals, stands or (), strict=False):
-            goal.positions[at, 0], goal.mask[at, 0] = (stand.x, 0.0, stand.z), (True, False, True)
-            goal.facing[at], goal.facing_mask[at] = stand.facing, True
+        for goal, pose in zip(goals, poses or (), strict=False):
+            goal.positions[at, 0], goal.mask[at, 0] = (pose.x, 0.0, pose.z), (True, False, True)
+            goal.facing[at], goal.facing_mask[at] = pose.facing, True
         return goals
 
     def _span(self, frames: int) -> tuple[int, int]:
@@ -138,9 +138,9 @@ class Meeting:
         """The frames in which the two are in each other's arms, of so many."""
         return self._span(frames) if self.contact.close and self.frame is not None else (0, 0)
 
-    def _stands(self, places: Array) -> list[GroundPose]:
-        """Where both stand while they are in each other's arms: as near and turned as the words say, in the middle of
-        where they are; nobody goes by where the other goes."""
+    def _embrace(self, places: Array) -> list[GroundPose]:
+        """Where both stand while they are in each other's arms: as near and turned as the words say, in the middle
+        between them."""
         hips = places[:, :, 0].mean(axis=1)
         line = (hips[1] - hips[0])[[0, 2]]
         distance = float(np.linalg.norm(line))
@@ -156,12 +156,12 @@ class Meeting:
             GroundPose(float(second[0]), float(second[1]), facing + np.pi),
         ]
 
-    def _beside(self, touch: Touch, other: Array, stands: list[GroundPose] | None) -> Array:
+    def _beside(self, touch: Touch, other: Array, poses: list[GroundPose] | None) -> Array:
         """(frames, 3) where a touch is on the other person, who is at (frames, 22, 3)."""
         beside = np.broadcast_to(np.array(touch.beside), (len(other), 3))
-        if stands is None:
+        if poses is None:
             return other[:, touch.other] + turned(beside, heading(other))
-        return stands[1 - touch.person].to_world(beside + np.array([0.0, _STANDING[touch.other], 0.0]))
+        return poses[1 - touch.person].to_world(beside + np.array([0.0, _STANDING[touch.other], 0.0]))
 
     def _point(self, places: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         """(frames, 3) where two hands meet, and the unit vectors from one to the other."""
@@ -198,17 +198,16 @@ EVEN = 5
 def met(people: Sequence[Motion], meeting: Meeting | None, also: Sequence[Goal | None]) -> tuple[Motion, Motion]:
     """Two people of the 22-joint skeleton at 20 frames per second in one world, fitted to each other.
 
-    What meets is brought together, and who is in the other's body comes out of it. also: what else each is asked.
+    What meets is brought together, and who is in the other's body comes out of it. also: further goals of each.
     """
-    made = list(people)
     free = np.array([goal is None for goal in also], dtype=np.float64)
     shares = free / free.sum().clip(1.0) * [-1.0, 1.0]
     for _ in range(ROUNDS):
-        places = np.stack([motion.positions() for motion in made])
-        asked = meeting.goals(places) if meeting else [Goal.nothing(places.shape[1])] * 2
+        places = np.stack([motion.positions() for motion in people])
+        touches = meeting.goals(places) if meeting else [Goal.nothing(places.shape[1])] * 2
         shift = shift_apart(places, close=meeting.close(places.shape[1]) if meeting else (0, 0))
         goals = [
-            overlaid(asked[i], overlaid(arms_out(places[i], places[1 - i]), _stepped(places[i], shares[i] * shift)))
+            overlaid(touches[i], overlaid(arms_out(places[i], places[1 - i]), _stepped(places[i], shares[i] * shift)))
             for i in (0, 1)
         ]
         if all(goal.empty for goal in goals):
@@ -216,8 +215,8 @@ def met(people: Sequence[Motion], meeting: Meeting | None, also: Sequence[Goal |
         goals = [
             goal if goal.empty or own is None else overlaid(own, goal) for goal, own in zip(goals, also, strict=True)
         ]
-        made = [fit(motion, goal) for motion, goal in zip(made, goals, strict=True)]
-    return made[0], made[1]
+        people = [fit(motion, goal) for motion, goal in zip(people, goals, strict=True)]
+    return people[0], people[1]
 
 
 def _stepped(own: Array, shift: Array) -> Goal:
@@ -275,7 +274,7 @@ SURE = 0.8
 
 @dataclass(eq=False)
 class Bodies:
-    """How the estimates of one pair are changed: their hands meet where something says so, and they are kept apart."""
+    """How the estimates of one pair are changed: their hands meet where there is a contact, and they are kept apart."""
 
     free: tuple[bool, bool]
     """Who may be moved as a whole."""
@@ -302,7 +301,7 @@ class Bodies:
     ) -> tuple[np.ndarray, np.ndarray]:
         """A denoised state (2, 1 + frames, 263), and the ground poses (2, 4) at its first frame, changed.
 
-        begin: the ground poses before; None: those that the state's own D says.
+        begin: the ground poses before; None: those of the state's own D.
         """
         places, motion = part(state)
         poses = code.decode(places) if begin is None else begin
@@ -311,17 +310,17 @@ class Bodies:
         free = np.array(self.free, dtype=np.float64)
         shares = free / free.sum().clip(1.0)
         pair = PairMotion(motion.astype(np.float64) * prior.spread + prior.mean, np.asarray(poses, dtype=np.float64))
-        made, close = pair, (0, 0)
+        moved, close = pair, (0, 0)
         if self.meeting:
             self.meeting.look(pair.places())
-            made = self._reaching(prior, self.meeting.near(made, shares), level)
+            moved = self._reaching(prior, self.meeting.near(moved, shares), level)
             close = self.meeting.close(motion.shape[1])
-        made = kept_apart(made, shares, still=self.still, close=close)
-        if made is pair:
+        moved = kept_apart(moved, shares, still=self.still, close=close)
+        if moved is pair:
             return state, poses
         # the difference: what is not sure yet is near 0, and must not become sure by this
-        places = (places + code.encode(made.poses) - code.encode(pair.poses)).astype(places.dtype)
-        return join(places, ((made.features - prior.mean) / prior.spread).astype(motion.dtype)), made.poses
+        places = (places + code.encode(moved.poses) - code.encode(pair.poses)).astype(places.dtype)
+        return join(places, ((moved.features - prior.mean) / prior.spread).astype(motion.dtype)), moved.poses
 
     def _reaching(self, prior: Prior, pair: PairMotion, level: int) -> PairMotion:
         """The pair, with limbs that reach for what they are to touch."""

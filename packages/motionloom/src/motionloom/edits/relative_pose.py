@@ -1,8 +1,8 @@
-"""Guidance of the relative pose of two people: while they are sampled, the block is asked for it again and again.
+"""Guidance of the relative pose of two people: while they are sampled, the block estimates it again and again.
 
 Features hold velocities, so small errors of an estimate add up, and two people who began as partners drift apart. A
 block estimates the relative pose of two people at the first frame of whatever it is shown, and it learned that from
-crops that begin anywhere. So every denoised estimate is cut at several frames, the *anchors*, the block is asked for
+crops that begin anywhere. So every denoised estimate is cut at several frames, the *anchors*, the block estimates
 the relative pose there, and both people are moved half of the way to its answers.
 """
 
@@ -22,12 +22,12 @@ from motionloom.weights.prior import Prior
 
 SPACING = 40
 """Frames from anchor to anchor, at most."""
-SHOWN = 60
+CROP = 60
 """Frames behind an anchor that the block is shown, at most."""
 LEAST = 20
 """Frames behind an anchor, at least."""
 SURE = 40
-"""Frames behind a past of both that stay as they are: their momentum says more than the block does."""
+"""Frames behind a past of both that stay as they are: their momentum is a better guess than the block's."""
 
 
 PoseGuidance: TypeAlias = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
@@ -59,20 +59,20 @@ def relative_pose_guidance(
         return lambda state, denoised, level: denoised
     known = np.asarray(mask[:, 1:, :3].all(axis=-1))
     both = np.asarray(people(known).all(axis=1))
-    given = [kept or bool(row.all()) for kept, row in zip(frozen, known, strict=True)]
+    fixed = [still or bool(row.all()) for still, row in zip(frozen, known, strict=True)]
     past = both.cumprod(axis=1).sum(axis=1).tolist()
-    places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
+    places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], fixed)
 
     def guided(state: np.ndarray, denoised: np.ndarray, level: int) -> np.ndarray:
-        made = places.guided(prior, net, bound, state=state, denoised=denoised, level=level, weight=weight)
-        return np.where(mask, denoised, made)
+        moved = places.guided(prior, net, bound, state=state, denoised=denoised, level=level, weight=weight)
+        return np.where(mask, denoised, moved)
 
     return guided
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where it is asked, and who is moved; for some pairs of one length."""
+    """Where the pose is estimated, and who is moved; for some pairs of one length."""
 
     anchors: tuple[tuple[int, ...], ...]
     """Frames of each pair."""
@@ -84,12 +84,12 @@ class Places:
     """(2 * all anchors, 4) of the numbers of D."""
 
     @staticmethod
-    def of(seeds: Sequence[int], frames: int, begins: Sequence[int], given: Sequence[bool]) -> "Places":
-        """seeds, given: one per row, whether that person is not moved; begins: one per pair, the last frame that
+    def of(seeds: Sequence[int], frames: int, begins: Sequence[int], fixed: Sequence[bool]) -> "Places":
+        """seeds, fixed: one per row, whether that person is not moved; begins: one per pair, the last frame that
         stays as it is."""
         anchors = tuple(_anchors(begin, frames) for begin in begins)
         spread = tuple(_spread([begin, *some], frames) for some, begin in zip(anchors, begins, strict=True))
-        free = 1.0 - np.array(given, dtype=np.float32).reshape(-1, 2)
+        free = 1.0 - np.array(fixed, dtype=np.float32).reshape(-1, 2)
         shares = free / free.sum(1, keepdims=True).clip(min=1.0)
         most = max(len(some) for some in anchors)
         shape = len(seeds), max(most, 1), PLACE
@@ -122,8 +122,8 @@ class Places:
         levels = level if isinstance(level, int) else level[rows]
         noised = prior.schedule.noised(code.encode(now).reshape(-1, PLACE), levels, self.noise)
         crops, lengths = _crops(state[:, 1:], rows.tolist(), [frame for frame in at for _ in (0, 1)])
-        asked = Bound._make(one[rows] for one in bound)._replace(lengths=lengths)
-        answer, _ = part(net(join(noised, crops), levels, asked))
+        condition = Bound._make(one[rows] for one in bound)._replace(lengths=lengths)
+        answer, _ = part(net(join(noised, crops), levels, condition))
         change = lacking(now, code.decode(people(answer))) * weight
         changed = (self._moved(pairs, change) - prior.mean) / prior.spread
         return join(places, changed.astype(np.float32, copy=False))
@@ -137,7 +137,7 @@ class Places:
 
 def _crops(motion: np.ndarray, rows: Sequence[int], begins: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """What of a motion (some rows, frames, 263) is in ``rows`` from frames ``begins`` on, padded; and how long."""
-    crops = [motion[row, begin : begin + SHOWN] for row, begin in zip(rows, begins, strict=True)]
+    crops = [motion[row, begin : begin + CROP] for row, begin in zip(rows, begins, strict=True)]
     lengths = [len(crop) for crop in crops]
     padded = np.zeros((len(crops), max(lengths), motion.shape[-1]), motion.dtype)
     for row, crop in zip(padded, crops, strict=True):
@@ -161,13 +161,13 @@ def _spread(at: Sequence[int], frames: int) -> np.ndarray:
     return positions_at(np.eye(len(at))[..., None], along)[:, 1:, 0].astype(np.float32)
 
 
-def lacking(now: np.ndarray, asked: np.ndarray, shares: Sequence[float] | np.ndarray = (0.5, 0.5)) -> np.ndarray:
+def lacking(now: np.ndarray, target: np.ndarray, shares: Sequence[float] | np.ndarray = (0.5, 0.5)) -> np.ndarray:
     """(rows, 3): what the second person's facing, x and z lack, relative to the first; from poses (rows, 2, 4).
 
     shares: of it that the first and the second person do.
     """
     first, second = now[:, 0], now[:, 1]
-    there = relative(asked[:, 0], asked[:, 1])
+    there = relative(target[:, 0], target[:, 1])
     turn = relative(relative(first, second), there)
     angle = np.arctan2(turn[:, 1], turn[:, 0])
     first = on_the_spot(first, -shares[0] * angle)

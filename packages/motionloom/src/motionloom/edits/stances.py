@@ -59,7 +59,7 @@ def _ends(standing: Flags) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _between(values: Array, standing: Flags, ease: int) -> Array:
-    """(frames, 3): the values in each stance, what leads from one stance to the next between them.
+    """(frames, 3): the values in each stance, what goes from one stance to the next between them.
 
     Further than ``ease`` from all stances it is 0.
     """

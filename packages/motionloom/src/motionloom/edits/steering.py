@@ -1,10 +1,10 @@
 """Steering: how a goal bends sampling. Each denoised estimate is changed, as little as it takes, to meet it.
 
-The change is the mean of a Gaussian process given what the goal asks (Rasmussen & Williams 2006, eq. 2.23): the root's
+The change is the mean of a Gaussian process given the goal's targets (Rasmussen & Williams 2006, eq. 2.23): the root's
 velocity and the joints' places may be off by smooth curves of known size, joints that hang on the same limb together.
 Given the heading, places are linear in all of these, so the change is a product with matrices that only depend on
-which joints are asked when: nothing is differentiated, and the network does not know. Its next estimate does the rest.
-Only somebody who jumps leaves the floor, by no more than people do: what is too high is asked as high as they get.
+which joints have targets when: nothing is differentiated, and the network does not know. Its next estimate does the
+rest. Only a person who jumps leaves the floor, by no more than people do: what is too high becomes as high as they get.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 
-# Reach: how far a body goes up and down for what is asked of its joints, with its feet on the floor
+# Reach: how far a body goes up and down for the targets of its joints, with its feet on the floor
 
 REACH = {j: (costs.beside(j, base), metres) for j, (base, metres) in costs.by_number(costs.REACH).items()}
 """Of the joints of limbs: where the limb begins, and metres that it reaches."""
@@ -42,7 +42,7 @@ _HOPELESS = 1.0
 
 
 def _straight(line: Array, reach: float) -> Array:
-    """(frames,) metres: how high a limb reaches that is asked to go along these lines (frames, 3) from its base."""
+    """(frames,) metres: how high a limb reaches along these lines (frames, 3) from its base."""
     return np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
 
 
@@ -65,7 +65,7 @@ def room_above(places: Array) -> Array:
 def lowered(goal: Goal, places: Array, room: Array) -> Goal:
     """The goal with what is too high for a body that goes up by ``room`` as high as it gets.
 
-    Where the height of the pelvis is asked all stays: it says by itself that somebody leaves the floor.
+    Where the goal has the height of the pelvis all stays: then it is the goal that leaves the floor.
 
     Args:
         goal: in the frame of ``places``.
@@ -90,8 +90,8 @@ def out_of_reach(places: Array, goal: Goal) -> Array:
     """
     need = np.zeros(len(places))
     for joint, (base, reach) in REACH.items():
-        asked = goal.mask[:, joint].all(axis=-1, keepdims=True)
-        line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
+        mask = goal.mask[:, joint].all(axis=-1, keepdims=True)
+        line = np.where(mask, goal.positions[:, joint] - places[:, base], 0.0)
         beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - _straight(line, reach)).clip(0)
         need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
     return np.where(need > -_HOPELESS, need, 0.0)
@@ -142,8 +142,8 @@ def toward(goal: Goal, prior: Prior, *, first: int = 0, known: bool = False) -> 
         noise = prior.schedule.at(level)[1]
         key = len(denoised), next(width for least, width in _WIDTHS if noise >= least)
         if key not in plans:
-            seen = goal.crop(0, min(len(goal), len(denoised) - first))
-            plans[key] = _plan(seen.padded(first, len(denoised) - first - len(seen)), first, key[1])
+            part = goal.crop(0, min(len(goal), len(denoised) - first))
+            plans[key] = _plan(part.padded(first, len(denoised) - first - len(part)), first, key[1])
         features = denoised * std + mean
         changed = (_bent(features, plans[key], first if known else 0) - features) / std
         return denoised + changed.astype(denoised.dtype)
@@ -173,10 +173,10 @@ def corrected_rows(denoised: np.ndarray, corrections: Sequence[Correction | None
 class _Limbs:
     """How targets on one coordinate move the joints."""
 
-    asked: tuple[NDArray[np.intp], NDArray[np.intp]]
+    targets: tuple[NDArray[np.intp], NDArray[np.intp]]
     """Frames and joints."""
     inverse: Array
-    """(asked, asked) inverse of the covariance of what is asked."""
+    """(targets, targets) inverse of their covariance."""
     together: Array
     """(22, 22) covariance of the joints."""
 
@@ -187,9 +187,9 @@ class _Plan:
     """In the row's frames."""
     first: int
     moving: NDArray[np.intp]
-    """Frames in which the root is asked to be somewhere, by itself or by a joint."""
+    """Frames in which the root has a target, its own or through a joint."""
     move: Array
-    """(frames + 1, moving): the root's change from what is asked of it; one frame more than the row has."""
+    """(frames + 1, moving): the root's change from its targets; one frame more than the row has."""
     turning: NDArray[np.intp]
     turn: Array
     """The same for the heading."""
@@ -248,21 +248,21 @@ def _bell(frames: int, width: float) -> Array:
     return np.exp(-0.5 * (lag / width) ** 2)
 
 
-def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
-    """(rows, asked): the posterior mean from what is seen at ``asked``, with noise of these standard deviations."""
-    if not len(asked):
+def _gain(covariance: Array, at: NDArray[np.intp], noise: Array) -> Array:
+    """(rows, n): the posterior mean from observations ``at`` n frames, with noise of these standard deviations."""
+    if not len(at):
         return np.zeros((len(covariance), 0))
-    inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
-    return np.asarray(np.linalg.solve(inner, covariance[asked]).T, dtype=np.float64)
+    inner = covariance[np.ix_(at, at)] + np.diag(noise**2)
+    return np.asarray(np.linalg.solve(inner, covariance[at]).T, dtype=np.float64)
 
 
-def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
-    if not asked.any():
+def _limb_plan(mask: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
+    if not mask.any():
         return None
-    busy, stride = np.flatnonzero(asked.any(axis=1)), 1
-    while int(asked[busy[::stride]].sum()) > MOST:
+    busy, stride = np.flatnonzero(mask.any(axis=1)), 1
+    while int(mask[busy[::stride]].sum()) > MOST:
         stride += 1
-    t, j = np.nonzero(asked & np.isin(np.arange(len(asked)), busy[::stride])[:, None])
+    t, j = np.nonzero(mask & np.isin(np.arange(len(mask)), busy[::stride])[:, None])
     inner = body[np.ix_(t, t)] * together[np.ix_(j, j)]
     if still is not None:
         inner += still[np.ix_(t, t)]
@@ -315,7 +315,7 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     denoised = _decoded(features, plan.first)
     error = np.where(plan.goal.mask, plan.goal.positions - denoised.world(), 0.0)
-    path = denoised.path + product(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
+    path = denoised.path + product(plan.move, _root_need(denoised.world(), error, plan.goal)[plan.moving])
     facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
     denoised = replace(denoised, path=path, facing=facing)
     goal = plan.goal
@@ -336,7 +336,7 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
         if limbs is None:
             continue
         pull = np.zeros(error.shape[:2])
-        pull[limbs.asked] = product(limbs.inverse, error[..., c][limbs.asked])
+        pull[limbs.targets] = product(limbs.inverse, error[..., c][limbs.targets])
         change[..., c] = product(plan.body, product(pull, limbs.together))
         if c != 1:
             path[:, c // 2] += product(plan.still, pull.sum(1))
@@ -358,13 +358,13 @@ def standing(features: Array, first: int) -> Array:
 def _standing(places: Array, contacts: Array, goal: Goal, known: int) -> Array:
     """(frames, 22, 3) metres that legs go so that feet stand still where the estimate says that they do.
 
-    A leg of which something is asked stays as it is around then. Feet that stand in the last of the ``known`` frames
-    keep the place that they have there.
+    A leg with a target stays as it is around then. Feet that stand in the last of the ``known`` frames keep the place
+    that they have there.
     """
     change = np.zeros_like(places)
     for side, (knee, ankle, toe) in enumerate(costs.LEGS):
-        asked = goal.mask[:, [knee, ankle, toe]].any(axis=(1, 2))
-        free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
+        busy = goal.mask[:, [knee, ankle, toe]].any(axis=(1, 2))
+        free = np.convolve(busy, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
         planted = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
         still = stilled(places[:, ankle], places[:, toe], planted, known=known)
         change[:, [ankle, toe]] = still[:, None]
@@ -398,10 +398,10 @@ def _encoded(old: Array, denoised: _Estimate) -> Array:
     return new
 
 
-def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
+def _root_need(places: Array, error: Array, goal: Goal) -> Array:
     """(frames, 2) metres: how far the root must go in each frame, the pelvis's own target first.
 
-    A joint asks for what is beyond its slack, or beyond the reach of its limb; several joints for the mean of that.
+    A joint needs what is beyond its slack, or beyond the reach of its limb; several joints need the mean of that.
     """
     far = np.linalg.norm(error, axis=-1, keepdims=True)
     beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]

@@ -1,1 +1,1 @@
-"""Targets of a motion: places, paths, drawings, masks and timelines, out of files or made in Python."""
+"""Targets of a motion: places, paths, drawings, masks and timelines, out of files or from Python."""

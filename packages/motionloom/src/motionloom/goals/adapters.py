@@ -17,13 +17,10 @@ Applied: TypeAlias = tuple[Any, float]
 
 def parse_adapter(word: str) -> tuple[Path, float]:
     """``FILE`` or ``FILE:FACTOR``, such as ``zombie.safetensors:0.8``. Raises `MotionloomError` for other words."""
-    name, _, tail = word.rpartition(":")
+    name, colon, tail = word.rpartition(":")
     try:
-        factor = float(tail)
+        name, factor = (name, float(tail)) if colon else (word, 1.0)
     except ValueError:
-        factor = 1.0
-        name = word
-    if ":" not in word:
         name, factor = word, 1.0
     if not name.strip() or not abs(factor) <= MOST_FACTOR:
         raise MotionloomError(

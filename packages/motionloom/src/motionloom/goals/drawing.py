@@ -24,7 +24,7 @@ _NOT_RENDERED = {"defs", "clipPath", "mask", "marker", "pattern", "symbol"}
 _MAX_BYTES = 16_000_000
 _DEEPEST = 500
 MAX_PIECES = 20_000
-"""Lines and curves in one drawn path."""
+"""Lines and curves in one path."""
 _FINE = 48
 """Straight pieces per curve."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -64,7 +64,7 @@ def _first_shape(data: bytes, path: Path | str) -> tuple[str, dict[str, str], Ar
     """Its name, its attributes and the 2 x 3 matrix of the transforms around it."""
     parser = expat.ParserCreate()
     around: list[tuple[bool, str]] = []  # of each element that is open: is it hidden, its transform
-    found: list[tuple[str, dict[str, str], list[str]]] = []
+    shapes: list[tuple[str, dict[str, str], list[str]]] = []
 
     def doctype(*_: object) -> None:
         raise MotionloomError(f"{path} declares a document type, which is not read; save it as plain SVG")
@@ -77,8 +77,8 @@ def _first_shape(data: bytes, path: Path | str) -> tuple[str, dict[str, str], Ar
             raise MotionloomError(f"{path} has elements more than {_DEEPEST} deep, which are not read")
         hidden = name in _NOT_RENDERED or bool(around and around[-1][0])
         around.append((hidden, attributes.get("transform", "")))
-        if name in SHAPES and not hidden and not found:
-            found.append((name, attributes, [said for _, said in around]))
+        if name in SHAPES and not hidden and not shapes:
+            shapes.append((name, attributes, [source for _, source in around]))
 
     def end(_: str) -> None:
         around.pop()
@@ -92,12 +92,12 @@ def _first_shape(data: bytes, path: Path | str) -> tuple[str, dict[str, str], Ar
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path} is not well-formed XML: {error}") from None
-    if not found:
+    if not shapes:
         raise MotionloomError(f"{path} has no line to walk: draw a {', '.join(SHAPES[:-1])} or {SHAPES[-1]}")
-    name, attributes, transforms = found[0]
+    name, attributes, transforms = shapes[0]
     matrix = np.eye(2, 3)
     try:
-        steps = list(islice((step for said in transforms for step in _transform(said)), MAX_TRANSFORMS + 1))
+        steps = list(islice((step for source in transforms for step in _transform(source)), MAX_TRANSFORMS + 1))
         if len(steps) > MAX_TRANSFORMS:
             raise _BadShape(f"more than {MAX_TRANSFORMS} transforms around it")
         for kind, values in steps:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
@@ -38,11 +38,11 @@ class Field:
         return ""
 
     def wrong(self, expected: str) -> NoReturn:
-        """Raise a `MotionloomError` that says what is expected and what the value is."""
+        """Raise a `MotionloomError` with what is expected and what the value is."""
         self.fail(f"must be {expected}; got {kind_of(self.value)}")
 
     def mapping(self, known: Collection[str], needed: Collection[str] = ()) -> dict[str, "Field"]:
-        """The values by key; no key but ``known`` ones, and all that are ``needed`` (fields say it themselves)."""
+        """The values by key; no key but ``known`` ones, and all that are ``needed`` (fields declare it themselves)."""
         if not isinstance(self.value, Mapping):
             self.wrong(f"a mapping with {listed(known)}")
         for key in self.value:
@@ -62,11 +62,7 @@ class Field:
             self.wrong("a list")
         if not least <= len(self.value) <= most:
             self.fail(f"has {len(self.value):,} entries; give {least} to {most:,}")
-        return list(self._numbered())
-
-    def _numbered(self) -> Iterator["Field"]:
-        for number, value in enumerate(self.value):
-            yield self._inner(value, f"[{number}]")
+        return [self._inner(value, f"[{number}]") for number, value in enumerate(self.value)]
 
     def _inner(self, value: Any, name: str) -> "Field":
         return Field(value, f"{self.name}{name}".removeprefix("."), self.source)
@@ -145,7 +141,7 @@ class LinedFile:
 
     path: Path
     places: tuple[str, ...] = field(default=(), kw_only=True)
-    """Of values that come from no file: what leads to each, by its number (`lined_of`)."""
+    """Of values that come from no file: the keys of each, by its number (`lined_of`)."""
 
     def mapping(self, node: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
         """The values by key; no key but ``keys``. what: the mapping, in words."""
@@ -159,8 +155,8 @@ class LinedFile:
     def items(self, node: Lined, name: str, *, of: str = "entry", most: int = MAX_ITEMS) -> list[Lined]:
         """The entries of a list, at least one. of: what one is, in a word."""
         if not isinstance(node.value, list) or not node.value:
-            got = "an empty list" if node.value == [] else node.kind
-            self.fail(node.line, f"'{name}' must be a list with at least one {of}; got {got}")
+            kind = "an empty list" if node.value == [] else node.kind
+            self.fail(node.line, f"'{name}' must be a list with at least one {of}; got {kind}")
         if len(node.value) > most:
             self.fail(node.line, f"'{name}' has {len(node.value):,} entries; at most {most:,} are read")
         return node.value
@@ -179,7 +175,7 @@ class LinedFile:
         return node.kind
 
     def fail(self, line: int, message: str) -> NoReturn:
-        """Raise a `MotionloomError` that names file and line, or the keys that lead there."""
+        """Raise a `MotionloomError` that names file and line, or the keys."""
         if not self.places:
             fail(self.path, line, message)
         raise MotionloomError(f"{self.path.name}, {self.at(line)}: {message}", where=self.places[line])

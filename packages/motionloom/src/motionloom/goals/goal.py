@@ -1,4 +1,4 @@
-"""`Goal`: what control asks of a motion, in the world: places of joints, and where the person faces.
+"""`Goal`: the targets of a motion, in the world: places of joints, and where the person faces.
 
 Metres, +Y up, radians about +Y (0 faces +Z, a quarter turn +X); 20 frames per second like everything that is sampled.
 """
@@ -19,7 +19,7 @@ Flags = NDArray[np.bool_]
 FPS = 20.0
 """Frames per second of every goal."""
 AGREE = 0.01
-"""Metres: two goals that ask the same joint to be at the same time further apart than this contradict each other."""
+"""Metres: two goals whose places for one joint at one time are further apart than this contradict each other."""
 AGREE_TURN = np.radians(5.0)
 """Radians: the same for directions."""
 SET_OUT = 0.05
@@ -110,10 +110,10 @@ class Goal:
 
 
 def start_of(goal: Goal) -> GroundPose:
-    """The person's ground pose at frame 0: `Goal.start` or, without it, what the targets say.
+    """The person's ground pose at frame 0: `Goal.start` or, without it, that of the targets.
 
     The place is the pelvis's, the direction that of the target facing at frame 0, else of the hips and shoulders with
-    targets there, else the way that the pelvis's path sets out. What no target says is 0: the origin, facing +Z.
+    targets there, else the way that the pelvis's path sets out. What no target decides is 0: the origin, facing +Z.
     """
     if goal.start is not None:
         return goal.start
@@ -142,7 +142,7 @@ def joined(first: Goal, second: Goal) -> Goal:
 
 
 def merged(first: Goal, second: Goal) -> Goal:
-    """The targets of both; MotionloomError where they ask for different places (`AGREE`), naming joint and time."""
+    """The targets of both; MotionloomError where they have different places (`AGREE`), naming joint and time."""
     if len(first) != len(second):
         raise MotionloomError(f"goals of {len(first)} and {len(second)} frames cannot be put together")
     both = first.mask & second.mask
@@ -159,7 +159,7 @@ def merged(first: Goal, second: Goal) -> Goal:
 
 
 def overlaid(first: Goal, second: Goal) -> Goal:
-    """The targets of both; those of the first where both ask for the same."""
+    """The targets of both; those of the first where both have one."""
     return Goal(
         np.where(first.mask, first.positions, second.positions),
         first.mask | second.mask,

@@ -1,4 +1,4 @@
-"""Goal files: what control asks, as JSON that says key by key what is wrong with it.
+"""Goal files: the targets of control as JSON, whose mistakes are reported key by key.
 
 `docs/control.md` explains the keys, `motionloom.requests.goal` lists them, `motionloom control --schema` prints them as
 a JSON Schema.
@@ -87,7 +87,7 @@ def _read_json(path: Path) -> Any:
 
 @dataclass(frozen=True)
 class _Start:
-    """Where the person starts, as far as the file says."""
+    """Where the person starts, as far as the file has it."""
 
     position: tuple[float, float] | None = None
     facing: float | None = None
@@ -190,13 +190,10 @@ class _Reader:
     def points(self, entries: dict[str, Field]):
         """Points (n, 2), their times or None, and no span."""
         known = keys.PATHS["points"]
-        places = value(entries, known, "points")
-        count = len(places)
-        if value(entries, known, "closed"):
-            if places[0] != places[-1] or count == 1:
-                places.append(places[0])
-            count = len(places)
-        return np.array(places, dtype=np.float64), self.times(entries.get("times"), count), None
+        places, closed = (value(entries, known, name) for name in ("points", "closed"))
+        if closed and (places[0] != places[-1] or len(places) == 1):
+            places.append(places[0])
+        return np.array(places, dtype=np.float64), self.times(entries.get("times"), len(places)), None
 
     def drawing_points(self, item: Field, entries: dict[str, Field], start: _Start):
         """Fine points (n, 2) of a drawing or named curve where the person starts, None, and from when to when."""
@@ -214,7 +211,7 @@ class _Reader:
         return points, None, None if span is None else (span[0], span[1])
 
     def metres(self, item: Field, entries: dict[str, Field], points: np.ndarray) -> float:
-        """Metres per unit of a drawing; as large as somebody walks in the time where the file does not say."""
+        """Metres per unit of a drawing; as large as somebody walks in the time where the file has no width."""
         if "width" in entries and "scale" in entries:
             item.fail("of a drawing has 'width' or 'scale', not both")
         if "scale" in entries:

@@ -55,12 +55,12 @@ class HeadMove:
         if self.kind in STROKE:
             stroke = STROKE[self.kind] * self.pace
             strokes = min(self.times, max(1, int(seconds / QUICKEST))) or max(1, round(seconds / stroke))
-            done = min(seconds, strokes * stroke) if self.times else seconds
-            phase = 2 * np.pi * strokes * np.clip(time / done, 0, 1)
+            length = min(seconds, strokes * stroke) if self.times else seconds
+            phase = 2 * np.pi * strokes * np.clip(time / length, 0, 1)
             if self.kind == "nods":
                 share = (1 - np.cos(phase)) / 2
             else:
-                share = np.sin(phase) * smoothstep(np.minimum(time, done - time) / min(ease, done / 4))
+                share = np.sin(phase) * smoothstep(np.minimum(time, length - time) / min(ease, length / 4))
         return math.radians(self.left) * share, math.radians(self.up) * share
 
 

@@ -53,7 +53,7 @@ def fixes_everything(parts: Sequence[FixedPart], seconds: float) -> bool:
 
 
 def _reach(spans: list[tuple[float, float]]) -> float:
-    """How far from 0 the stretches lead without a gap."""
+    """How far from 0 the stretches go without a gap."""
     reached = 0.0
     for begin, end in sorted(spans):
         if begin > reached:

@@ -25,7 +25,7 @@ def in_digits(text: str, *, lower: bool = True) -> str:
     """
     result = " ".join(text.lower().replace(",", " ").split()) if lower else text
     result = _WORDS.sub(_value, result)
-    result = _HALF.sub(lambda found: f"{float(found[1]) + 0.5:g}", result)
+    result = _HALF.sub(lambda match: f"{float(match[1]) + 0.5:g}", result)
     result = re.sub(r"\bhalf an? (?=m(?:et|in)|second|foot|yard)", "0.5 ", result)
     result = re.sub(r"\ba couple of (?=m(?:et|in)|second|feet|yard|step)|\ba pair of (?=step)", "2 ", result)
     result = re.sub(r"\b(?:about|around|approximately|roughly|exactly|some) (?=\d)", "", result)

@@ -59,10 +59,10 @@ def remarks_on_two(
     """
     prompts = {text: prompts_of(text) for text in texts if text.strip()}
     remarks = []
-    for text, said in prompts.items():
-        if MARK not in text and said[0] != said[1]:
-            remarks.append(Remark(text, f"read as: '{said[0]} {MARK} {said[1]}'"))
-        contact = read_contact(said)
+    for text, pair in prompts.items():
+        if MARK not in text and pair[0] != pair[1]:
+            remarks.append(Remark(text, f"read as: '{pair[0]} {MARK} {pair[1]}'"))
+        contact = read_contact(pair)
         remarks += [] if contact is None else [Remark(text, f"read as: {contact}")]
     if block_known is not None and prompts:
         matches = nearest(block_known, [without_two(text) for text in prompts], encoder)
@@ -71,7 +71,7 @@ def remarks_on_two(
             for text, one in zip(prompts, matches, strict=True)
             if not one.near
         ]
-    return remarks + remarks_on([prompt for said in prompts.values() for prompt in said], known, encoder)
+    return remarks + remarks_on([prompt for pair in prompts.values() for prompt in pair], known, encoder)
 
 
 def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> list[Remark]:

@@ -50,11 +50,11 @@ def goal_schema() -> Schema:
         "left of somebody who faces +Z. Read by motionloom control. Times lie within the motion and rise, and goals "
         "are within a person's reach."
     )
-    found: Any = _file("goal", about, goal.GOAL, kinds) | {"minProperties": 1}
-    found["properties"]["$schema"] = {"type": "string", "description": "for editors"}
+    result: Any = _file("goal", about, goal.GOAL, kinds) | {"minProperties": 1}
+    result["properties"]["$schema"] = {"type": "string", "description": "for editors"}
     facing = [{"enum": ["along", "free"]}, directions["items"], directions]
     defs = {"joint": {"enum": list(GOAL_JOINTS)}, "place": place, "facing": {"anyOf": facing}}
-    return found | {"$defs": defs | {"point": _object(goal.POINT, kinds)}}
+    return result | {"$defs": defs | {"point": _object(goal.POINT, kinds)}}
 
 
 def mask_schema() -> Schema:
@@ -80,16 +80,16 @@ def timeline_schema() -> Schema:
     }
     segment = _object(specs(SegmentKeys), kinds) | {"not": {"required": ["goal", "goals"]}}
     about = "What a person does, one segment after the other. Read by motionloom compose."
-    found = _file("timeline", about, specs(TimelineKeys), kinds)
-    return found | {"$defs": {"segment": {"anyOf": [segment["properties"]["text"], segment]}}}
+    result = _file("timeline", about, specs(TimelineKeys), kinds)
+    return result | {"$defs": {"segment": {"anyOf": [segment["properties"]["text"], segment]}}}
 
 
 def _object(keys: Mapping[str, Spec], kinds: Mapping[str, Schema]) -> Schema:
     """A mapping of these keys and no others."""
     needed = [name for name, spec in keys.items() if spec.needed]
-    found: dict[str, Any] = {"type": "object", "additionalProperties": False}
-    found |= {"required": needed} if needed else {}
-    return found | {"properties": {name: schema(spec, kinds) for name, spec in keys.items()}}
+    result: dict[str, Any] = {"type": "object", "additionalProperties": False}
+    result |= {"required": needed} if needed else {}
+    return result | {"properties": {name: schema(spec, kinds) for name, spec in keys.items()}}
 
 
 def _file(name: str, about: str, keys: Mapping[str, Spec], kinds: Mapping[str, Schema]) -> Schema:

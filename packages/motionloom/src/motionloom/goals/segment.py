@@ -9,7 +9,7 @@ from motionloom.requests.sampling import LARGEST_GUIDANCE
 from motionloom.requests.shared import LONGEST
 
 TRANSITION = 1.0
-"""Seconds that neighbours share unless said otherwise: the paper's handshake."""
+"""Seconds that neighbours share by default: the paper's handshake."""
 
 
 @dataclass(frozen=True)

@@ -166,8 +166,8 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
 
 def _is_posture(part: str) -> bool:
     """Whether somebody ends up low and can stay so."""
-    done = part.removeprefix(subject_of(part)).strip()
-    return verb_of(done, mood_of(done)) in _POSTURES
+    rest = part.removeprefix(subject_of(part)).strip()
+    return verb_of(rest, mood_of(rest)) in _POSTURES
 
 
 def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float = 20.0) -> list[float]:
@@ -214,8 +214,8 @@ def natural_seconds(text: str) -> float:
 
 def _part_seconds(part: str) -> float:
     """How long a part takes behind which another comes: who stops to do something stops briefly."""
-    done = part.removeprefix(subject_of(part)).strip()
-    stops = verb_of(done, mood_of(done)) in ("stop", "halt", "pause", "freeze") and " for " not in done
+    rest = part.removeprefix(subject_of(part)).strip()
+    stops = verb_of(rest, mood_of(rest)) in ("stop", "halt", "pause", "freeze") and " for " not in rest
     return 1.5 if stops else natural_seconds(part)
 
 
@@ -401,22 +401,22 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
             continue
         before = result[-1]
         named = subject_of(part)
-        done = part.removeprefix(named).strip()
-        if _only_ends(before, done):
-            result[-1] = f"{before} and {done}"
+        rest = part.removeprefix(named).strip()
+        if _only_ends(before, rest):
+            result[-1] = f"{before} and {rest}"
         else:
-            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(before, done)}".strip())
+            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(before, rest)}".strip())
     return result
 
 
-def _only_ends(before: str, done: str) -> bool:
+def _only_ends(before: str, rest: str) -> bool:
     """Whether something only ends, or keeps, what was done before."""
-    if _ENDS.fullmatch(done):
+    if _ENDS.fullmatch(rest):
         return not _SEATED.search(before)
-    if _SQUATS.search(before) and _RISES_AGAIN.fullmatch(done):
+    if _SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
         return True
     first = verb_of(before.removeprefix(subject_of(before)).strip(), mood_of(before))
-    return bool(_STAYS.fullmatch(done)) and first not in _WALKS
+    return bool(_STAYS.fullmatch(rest)) and first not in _WALKS
 
 
 def _with_repeated_words(before: str, part: str) -> str:
@@ -432,16 +432,16 @@ def _with_repeated_words(before: str, part: str) -> str:
     return ""
 
 
-def _rephrased(before: str, done: str) -> str:
+def _rephrased(before: str, rest: str) -> str:
     """The action in words that make sense without the sentence before."""
-    mood = mood_of(done) or "third"
-    back = _BACK_AGAIN.fullmatch(done)
+    mood = mood_of(rest) or "third"
+    back = _BACK_AGAIN.fullmatch(rest)
     if back and _TURNED.search(before):
         moves = (back[1] or "walk").lower()
         return f"{_form('walk' if moves in ('come', 'go') else moves, mood)} forward"
-    if (_UP_AGAIN.fullmatch(done) or _ENDS.fullmatch(done)) and _SEATED.search(before):
+    if (_UP_AGAIN.fullmatch(rest) or _ENDS.fullmatch(rest)) and _SEATED.search(before):
         return f"{_form('stand', mood)} up{' from the floor' if _ON_THE_FLOOR.search(before) else ' again'}"
-    return done
+    return rest
 
 
 def _form(base: str, mood: str) -> str:

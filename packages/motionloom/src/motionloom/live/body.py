@@ -22,18 +22,18 @@ from motionloom.skeleton import SMPL22, Skeleton
 Array = NDArray[np.float64]
 
 
-def body(positions: Array, contacts: Array, fps: float, shown: Motion | None) -> Motion:
+def body(positions: Array, contacts: Array, fps: float, past: Motion | None) -> Motion:
     """The 22-joint person of places (frames, 22, 3) metres, begun with the frames that were shown.
 
-    The first ``len(shown)`` places are those that ``shown`` was made of; contacts: (frames, 4) as in the features.
+    past: these frames, computed from the first ``len(past)`` places; contacts: (frames, 4) as in the features.
     """
     sampled = motion_from_positions(positions, fps)
-    if shown is None:
+    if past is None:
         return clean_feet(sampled, contacts=contacts)
-    return _begun(shown, clean_feet(_continuing(sampled, shown), contacts=contacts, shown=len(shown)))
+    return _begun(past, clean_feet(_continuing(sampled, past), contacts=contacts, shown=len(past)))
 
 
-def put(motion: Motion, skeleton: Skeleton, shown: Motion | None) -> Motion:
+def transfer(motion: Motion, skeleton: Skeleton, past: Motion | None) -> Motion:
     """A motion of the 22-joint person on another skeleton, begun with the frames that were shown on that.
 
     A foot is planted there when the 22-joint person's is.
@@ -41,37 +41,37 @@ def put(motion: Motion, skeleton: Skeleton, shown: Motion | None) -> Motion:
     if skeleton == SMPL22:
         return motion
     retargeted = retarget(motion, skeleton)
-    if shown is None:
+    if past is None:
         return retargeted
-    continued, since = _continuing(retargeted, shown), len(shown) - 1
+    continued, since = _continuing(retargeted, past), len(past) - 1
     places, planted = joints22(continued)[since:], planted_feet(motion.positions(), motion.fps)[since:]
     shift = np.zeros((len(motion), 2, 3))
     for i in (0, 1):
         ankle, toe = FEET[2 * i : 2 * i + 2]
         flags = planted[:, 2 * i : 2 * i + 2]
         shift[since:, i] = correction(places[:, ankle], places[:, toe], flags, motion.fps, held=True)
-    return _begun(shown, move_feet(continued, shift))
+    return _begun(past, move_feet(continued, shift))
 
 
-def _begun(shown: Motion, made: Motion) -> Motion:
-    """What was made, its first frames bit for bit those that were shown."""
-    count = len(shown)
-    turns = rot.unroll(np.concatenate([shown.rotations[-1:], made.rotations[count:]]))[1:]
+def _begun(past: Motion, motion: Motion) -> Motion:
+    """The motion, its first frames bit for bit those that were shown."""
+    count = len(past)
+    turns = rot.unroll(np.concatenate([past.rotations[-1:], motion.rotations[count:]]))[1:]
     return replace(
-        made,
-        root=np.concatenate([shown.root, made.root[count:]]),
-        rotations=np.concatenate([shown.rotations, turns]),
+        motion,
+        root=np.concatenate([past.root, motion.root[count:]]),
+        rotations=np.concatenate([past.rotations, turns]),
     )
 
 
-def _continuing(sampled: Motion, shown: Motion) -> Motion:
+def _continuing(sampled: Motion, past: Motion) -> Motion:
     """The shown frames, and the sampled ones behind them, which take up pose and velocity of what was shown."""
-    count, behind = len(shown), len(sampled) - len(shown)
+    count, behind = len(past), len(sampled) - len(past)
     reach = min(JOIN, behind)
-    off = shown.root - sampled.root[:count]
+    off = past.root - sampled.root[:count]
     root = sampled.root.copy()
-    root[:count] = shown.root
+    root[:count] = past.root
     root[count : count + reach] += match_boundary(off[-1], off[-1] - off[max(count - 2, 0)], reach)
-    turns = match_rotations(sampled.rotations, shown.rotations, count - 1, 1, reach)
-    turns[:count] = shown.rotations
+    turns = match_rotations(sampled.rotations, past.rotations, count - 1, 1, reach)
+    turns[:count] = past.rotations
     return replace(sampled, root=root, rotations=rot.unroll(rot.normalize(turns)))

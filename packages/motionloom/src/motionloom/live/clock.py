@@ -1,6 +1,6 @@
 """A `Live` against the time: a thread that samples ahead, a bounded buffer, and frames that are handed out on time.
 
-Only frames that were handed out are fixed. When something is asked, what is in the buffer is made anew from the first
+Only frames that were handed out are fixed. After a command, what is in the buffer is computed anew from the first
 frame on that a window can be ready for, so a command waits about as long as a window takes, however long the
 buffer is; a window that is being sampled because the buffer runs short is given up for it. Where a new window comes too
 late, because frames that it was to replace were shown meanwhile, those stay, and it is sampled once more from later on.
@@ -20,8 +20,8 @@ from statistics import median_low
 from typing import Generic
 
 from motionloom.features.layout import FPS
-from motionloom.live.commands import Command, Taken
-from motionloom.live.live import LOGGED, Frame, Mark, Shown, Stage
+from motionloom.live.commands import Command, FrameCommand
+from motionloom.live.live import LOGGED, Frame, Frames, Mark, Stage
 from motionloom.tasks.watching import watching
 
 SHORTEST, LONGEST = 0.5, 2.0
@@ -33,16 +33,16 @@ USUAL, SPARE = 0.8, 1.05
 WAITING = 64
 """Commands that wait for the planner; of more the oldest are dropped."""
 SLOW = 0.6
-"""Seconds that a command waits from which on the machine is said to be too slow."""
+"""Seconds that a command waits from which on the machine counts as too slow."""
 LATE = 0.02
 """Seconds after its time from which on a frame counts as late."""
 SLOWER, SLOWEST = 1.15, 0.2
 """A window is shown for so many times as long as one takes, where that is longer than its frames last; and the rate
 below which nothing is shown evenly."""
 REMEMBERED = 20
-"""Windows whose drawing times are looked at."""
+"""Windows whose sampling times are looked at."""
 LATELY = 3
-"""Of them the last, half of which say that the machine has become slow."""
+"""Of them the last, half of which decide that the machine has become slow."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +60,16 @@ class Health:
     dropped: int
     """Commands that were thrown away because too many came."""
     times: float
-    """Frames are made so many times faster than they are shown; 0 before the first."""
+    """Frames are computed so many times faster than they are shown; 0 before the first."""
     rate: float = 1.0
-    """How fast frames are shown: 1 as somebody moves, less where the machine makes them more slowly than that."""
+    """How fast frames are shown: 1 as a person moves, less where the machine computes them more slowly than that."""
     problem: str = ""
     """In words, where the machine is too slow."""
 
 
-def first_of(shown: Frame | tuple[Frame, Frame]) -> Frame:
+def first_of(frames: Frame | tuple[Frame, Frame]) -> Frame:
     """The frame of the only person, or of the first of two: both have one number and one time."""
-    return shown if isinstance(shown, Frame) else shown[0]
+    return frames if isinstance(frames, Frame) else frames[0]
 
 
 class Pace:
@@ -87,7 +87,7 @@ class Pace:
         return max(0.0, self._due(frame) - self._now())
 
     def late(self, frame: Frame) -> float:
-        """Seconds that a frame comes after its time; asked once, when it is shown."""
+        """Seconds that a frame comes after its time; called once, when it is shown."""
         due = self._due(frame)
         late = max(0.0, self._now() - due)
         self._last = frame.time, due + (late if late > LATE else 0.0)  # the clock waits: what follows is not rushed
@@ -96,37 +96,37 @@ class Pace:
     def _due(self, frame: Frame) -> float:
         if self._last is None:
             return self._now()
-        time, shown = self._last
-        return shown + (frame.time - time) / self._rate()
+        time, moment = self._last
+        return moment + (frame.time - time) / self._rate()
 
 
 @dataclass(frozen=True, eq=False)
-class _Ready(Generic[Shown]):
+class _Ready(Generic[Frames]):
     """A frame in the buffer."""
 
     mark: Mark
-    """Before it was made."""
-    shown: Shown
-    taken: list[Taken]
+    """Before it was computed."""
+    frames: Frames
+    commands: list[FrameCommand]
 
 
 class _GivenUp(Exception):
     """A window that is not needed any more."""
 
 
-class Player(Generic[Shown]):
+class Player(Generic[Frames]):
     """Plays one `Live` or `LivePair` against the time. Commands come from any thread; frames are taken by one."""
 
-    def __init__(self, live: Stage[Shown], *, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, live: Stage[Frames], *, now: Callable[[], float] = time.monotonic) -> None:
         self._live, self._now = live, now
         self._inbox: deque[tuple[Command, int]] = deque()
-        self._buffer: deque[_Ready[Shown]] = deque()
+        self._buffer: deque[_Ready[Frames]] = deque()
         self._next, self._due = live.number, now()  # the frame that is taken next, and when, as far as one knows
-        self._log: deque[Taken] = deque(maxlen=LOGGED)
+        self._log: deque[FrameCommand] = deque(maxlen=LOGGED)
         self._changed = threading.Condition()
         self._stopped, self._error = False, None
-        self._soonest = 0  # the frame at 20 per second from which on something else that is asked is followed
-        self._calm = False  # whether a window is being sampled for which nobody asked
+        self._soonest = 0  # frame at 20 per second from which on a command is followed
+        self._calm = False  # whether a window is being sampled without a command
         self._lead, self._length = 0.25, SHORTEST  # seconds that a window is expected to take; seconds of the buffer
         self._rest = live.settings.rest
         self._took: deque[float] = deque(maxlen=REMEMBERED)
@@ -134,19 +134,19 @@ class Player(Generic[Shown]):
         self._health = Health(0, 0, 0.0, self._lead, 0, 0.0)
         self._thread = threading.Thread(target=self._plan, name="motionloom-live", daemon=True)
 
-    def start(self) -> "Player[Shown]":
+    def start(self) -> "Player[Frames]":
         """Begin to sample ahead, in a thread of its own."""
         self._thread.start()
         return self
 
-    def __enter__(self) -> "Player[Shown]":
+    def __enter__(self) -> "Player[Frames]":
         return self.start()
 
     def __exit__(self, *_: object) -> None:
         self.stop()
 
     def stop(self) -> None:
-        """End the planner; frames that were made can still be taken."""
+        """End the planner; finished frames can still be taken."""
         with self._changed:
             self._stopped = True
             self._changed.notify_all()
@@ -155,11 +155,11 @@ class Player(Generic[Shown]):
 
     @property
     def ended(self) -> bool:
-        """Whether no more frames are made."""
+        """Whether no more frames are computed."""
         return self._stopped
 
     def ask(self, command: Command, person: int | None = None) -> None:
-        """Ask for something as soon as possible, as of `Stage.ask`."""
+        """Send a command that takes effect as soon as possible, as of `Stage.ask`."""
         parts = self._live.addressed(command, person)
         with self._changed:
             self._inbox.extend(parts)
@@ -175,44 +175,44 @@ class Player(Generic[Shown]):
             return self._health
 
     @property
-    def taken(self) -> list[Taken]:
-        """What was asked and is seen in the frames that were taken, with the first of these (`Stage.taken`)."""
+    def taken(self) -> list[FrameCommand]:
+        """The commands that the frames taken so far show, each with the first of these frames (`Stage.taken`)."""
         with self._changed:
             return list(self._log)
 
-    def frames(self) -> Iterator[Shown]:
+    def frames(self) -> Iterator[Frames]:
         """Frames, each at its time; without end, or until `stop`."""
         pace = Pace(self._now, lambda: self._health.rate)
         while (coming := self.coming()) is not None:
             time.sleep(pace.until(first_of(coming)))
-            found = self.take()
-            assert found is not None
-            self.shown(pace.late(first_of(found)))
-            yield found
+            frames = self.take()
+            assert frames is not None
+            self.count_frame(pace.late(first_of(frames)))
+            yield frames
 
-    def coming(self, timeout: float | None = None) -> Shown | None:
-        """The next frame as it is planned now, as soon as it is there; until it is taken it may be made anew. None
+    def coming(self, timeout: float | None = None) -> Frames | None:
+        """The next frame as it is planned now, as soon as it is there; until it is taken it may be computed anew. None
         after ``timeout`` seconds or at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._buffer or self._stopped or self._error, timeout)
             if not self._buffer and self._error is not None:
                 raise self._error
-            return self._buffer[0].shown if self._buffer else None
+            return self._buffer[0].frames if self._buffer else None
 
-    def take(self, timeout: float | None = None) -> Shown | None:
+    def take(self, timeout: float | None = None) -> Frames | None:
         """The next frame as soon as it is there, whatever the time, which is fixed from now on; None after ``timeout``
         seconds or at the end. Who shows frames at their times takes each when it is due, so that commands do not wait.
         """
         with self._changed:
             if self.coming(timeout) is None:
                 return None
-            found = self._buffer.popleft()
+            ready = self._buffer.popleft()
             self._next, self._due = self._next + 1, self._now() + 1 / (self._live.fps * self._health.rate)
-            self._log += found.taken
+            self._log += ready.commands
             self._changed.notify_all()
-            return found.shown
+            return ready.frames
 
-    def shown(self, late: float) -> None:
+    def count_frame(self, late: float) -> None:
         """Count a frame that was shown, so many seconds after its time."""
         with self._changed:
             old = self._health
@@ -254,8 +254,8 @@ class Player(Generic[Shown]):
         return self._extend if room else None
 
     def _place(self) -> Mark | None:
-        """The first frame of the buffer from which on what is asked can be followed: a window is ready before it is
-        due, and what was asked before is not too near."""
+        """The first frame of the buffer from which on a command can be followed: a window is ready before it is
+        due, and the command before is not too near."""
         wait = self._lead - max(0.0, self._due - self._now())
         first = max(0, ceil(wait * self._live.fps * self._health.rate - 1e-6))
         marks = (ready.mark for ready in islice(self._buffer, first, None))
@@ -272,50 +272,50 @@ class Player(Generic[Shown]):
 
     def _extend(self) -> None:
         """One frame more for the buffer."""
-        begun, mark, drawn = self._now(), self._live.mark(), self._live.drawn
+        begun, mark, window = self._now(), self._live.mark(), self._live.window
         self._calm = True
         try:
-            made = self._made()
+            ready = self._next_ready()
         except _GivenUp:
             self._live.back(mark)
-            made = None
+            ready = None
         self._calm = False
         took = self._now() - begun
         with self._changed:
             self._busy += took
-            if made is not None:
-                self._buffer.append(made)
-            if self._live.drawn != drawn:
+            if ready is not None:
+                self._buffer.append(ready)
+            if self._live.window != window:
                 self._fit(took)
             self._changed.notify_all()
 
-    def _made(self) -> _Ready[Shown]:
-        mark, shown = self._live.mark(), next(self._live)
-        return _Ready(mark, shown, self._live.fresh)
+    def _next_ready(self) -> _Ready[Frames]:
+        mark, frames = self._live.mark(), next(self._live)
+        return _Ready(mark, frames, self._live.fresh)
 
     def _follow(self, mark: Mark) -> None:
-        """Take up what was asked from a frame of the buffer on, or behind its last one."""
-        begun, live, made = self._now(), self._live, []
+        """Take up the commands from a frame of the buffer on, or behind its last one."""
+        begun, live, ready = self._now(), self._live, []
         with self._changed:
-            asked = list(self._inbox)
+            commands = list(self._inbox)
             self._inbox.clear()
         undo = live.back(mark)
-        for command, person in asked:
+        for command, person in commands:
             live.ask(command, person)
-        while live.drawn == mark.drawn:
-            made.append(self._made())
+        while live.window == mark.window:
+            ready.append(self._next_ready())
         took = self._now() - begun
         with self._changed:
             self._busy += took
             if self._next > mark.frame:  # it was shown meanwhile
                 live.forth(undo)
-                self._inbox.extendleft(reversed(asked))
+                self._inbox.extendleft(reversed(commands))
                 self._fit(took, least=took)
             else:
                 while self._buffer and self._buffer[-1].mark.frame >= mark.frame:
                     self._buffer.pop()
-                self._buffer.extend(made)
-                self._soonest = live.drawn + self._rest
+                self._buffer.extend(ready)
+                self._soonest = live.window + self._rest
                 self._fit(took)
             self._changed.notify_all()
 
@@ -338,8 +338,8 @@ class Player(Generic[Shown]):
     def _problem(self, longest: float, rate: float) -> str:
         if self._lead <= SLOW:
             return ""
-        said = (
+        sentence = (
             f"this machine takes {longest:.2f} s for a window of motion: what is asked is followed every "
             f"{self._rest / (FPS * rate):.2f} s and {self._lead:.2f} s late"
         )
-        return said if rate == 1 else f"{said}, and all is shown at {rate:.2f} of its speed"
+        return sentence if rate == 1 else f"{sentence}, and all is shown at {rate:.2f} of its speed"

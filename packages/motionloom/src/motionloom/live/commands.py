@@ -1,4 +1,4 @@
-"""What can be asked of somebody who moves, as values, and the JSON objects that say the same.
+"""Commands for a live motion, as values, and the JSON objects that hold the same.
 
 In Python directions are radians about +Y (0 is +Z, a quarter turn +X) as everywhere; in JSON they are degrees, as in
 goal files. Everything is checked here, so that nothing that comes from outside reaches the planner unchecked.
@@ -137,8 +137,8 @@ def scaled(command: Command, size: float) -> Command:
         raise MotionloomError(f"{error}; that is of the person, {size:.2f} times as large as the robot") from None
 
 
-class Taken(NamedTuple):
-    """Something that was asked, with the frame that it first changed."""
+class FrameCommand(NamedTuple):
+    """A command, with the frame that it first changed."""
 
     frame: int
     """Number of the frame, at the rate that is shown."""
@@ -155,23 +155,23 @@ COMMANDS: Mapping[str, type] = {"say": Say, "steer": Steer, "path": Path, "reach
 TURNS = ("direction", "facing")
 
 
-def from_json(said: Any) -> Command:
-    """The command that a JSON object says; `MotionloomError` for anything else. Whom it is for says `person_of`."""
-    if not isinstance(said, Mapping) or not isinstance(said.get("type"), str):
+def from_json(message: Any) -> Command:
+    """The command in a JSON object; `MotionloomError` for anything else. Its person is that of `person_of`."""
+    if not isinstance(message, Mapping) or not isinstance(message.get("type"), str):
         raise MotionloomError('a command is a JSON object with a "type"')
-    kind = said["type"]
+    kind = message["type"]
     if kind not in COMMANDS:
         raise MotionloomError(f"there is no command {kind[:40]!r}; the commands are {', '.join(COMMANDS)}")
-    values = {key: value for key, value in said.items() if key not in ("type", "person")}
+    values = {key: value for key, value in message.items() if key not in ("type", "person")}
     for name in TURNS:
         if kind == "steer" and values.get(name) is not None:
             values[name] = math.radians(TURN.check(values[name], repr(name)))
     return read(COMMANDS[kind], values, f"the command {kind}")
 
 
-def person_of(said: Mapping[str, Any]) -> int | None:
+def person_of(message: Mapping[str, Any]) -> int | None:
     """Which person a JSON object is for, 0 or 1; None where it names nobody, which is everybody."""
-    number = said.get("person")
+    number = message.get("person")
     if number is None:
         return None
     if isinstance(number, bool) or number not in (1, 2):

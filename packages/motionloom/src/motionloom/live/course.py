@@ -1,10 +1,10 @@
-"""Where somebody is to go in the frames of the next window: steering, paths, and what is walked to to be reached.
+"""Where a person is to go in the frames of the next window: steering, paths, and the way to what is to be reached.
 
-Steering and paths are a few places of the pelvis, asked every `EVERY` frames only, so that between them the body sways
-as it is sampled. Nobody changes pace or way within a frame: what is asked begins with how the person moves.
+Steering and paths are goals for the pelvis in every `EVERY`-th frame only, so that between them the body sways
+as it is sampled. Nobody changes pace or way within a frame: a goal begins with how the person moves.
 
-A window knows of what is asked of its own frames. So what is to be reached later waits until it is near in time, and
-what is out of anybody's reach until somebody stands before it.
+A window has the goals of its own frames. So what is to be reached later waits until it is near in time, and
+what is out of anybody's reach until the person is in front of it.
 """
 
 import math
@@ -23,7 +23,7 @@ from motionloom.live.commands import Path, Pose, Reach, Steer
 Array = NDArray[np.float64]
 
 EVERY = 8
-"""Frames between two places that are asked."""
+"""Frames between two goals for the pelvis."""
 PICK_UP, TURN = 12.0, 20.0
 """Frames in which a pace is taken up at least, and in which half a turn is made."""
 CHANGE = 0.0075
@@ -48,7 +48,7 @@ class Course:
 
 
 def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
-    """Places and facings for so many frames, in the world, at the asked speed; facings alone where none is asked."""
+    """Places and facings for so many frames, in the world, at the steered speed; facings alone where there is none."""
     goal = Goal.nothing(frames)
     at = np.arange(EVERY, frames, EVERY)
     if steer.speed is not None:
@@ -64,7 +64,7 @@ def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
 
 
 def braking(course: Course, frames: int) -> Goal:
-    """Places for somebody who comes to a stand where he goes; none are asked when he stands."""
+    """Places for a person who comes to a stand on the way; none once the person stands."""
     goal = Goal.nothing(frames)
     over = math.hypot(*course.velocity) / CHANGE
     at = np.arange(EVERY, frames, EVERY)
@@ -74,7 +74,7 @@ def braking(course: Course, frames: int) -> Goal:
 
 
 def _ask(goal: Goal, at: NDArray[np.int_], way: Array) -> None:
-    """Ask for the pelvis in some frames of a way (frames, 2)."""
+    """Put the pelvis on a way (frames, 2) in some frames."""
     goal.positions[at, 0, ::2] = way[at]
     goal.mask[at, 0, ::2] = True
 
@@ -142,8 +142,8 @@ class Trail:
             aim = [np.interp(gone + AHEAD, self._along, column) for column in self._points.T] - here
             off = float(turn_between(math.atan2(*aim), angle)) if np.linalg.norm(aim) > 0.05 else 0.0
             angle += float(np.clip(off, -FASTEST_TURN, FASTEST_TURN))
-            wanted = min(self.speed * max(0.3, math.cos(off)), math.sqrt(2 * BRAKING * max(left, 0.0))) / fps
-            pace += float(np.clip(wanted - pace, -2 * GAIN, GAIN))
+            speed = min(self.speed * max(0.3, math.cos(off)), math.sqrt(2 * BRAKING * max(left, 0.0))) / fps
+            pace += float(np.clip(speed - pace, -2 * GAIN, GAIN))
             here = here + pace * np.array([math.sin(angle), math.cos(angle)])
             gone = self._come(here, gone, 2 * pace + 0.1)
         goal, at = Goal.nothing(frames), np.arange(EVERY, frames, EVERY)
@@ -153,7 +153,7 @@ class Trail:
 
 
 NEAR, NEAR_POSE = 50, 20
-"""Frames before its time from which on a place to reach is asked of windows, and a pose, which is taken where somebody
+"""Frames before its time from which on windows have a place to reach, and a pose, which is taken where the person
 is by then."""
 SOON, OFF = 12, 15
 """Frames in which something is reached by somebody who has come to it, and those in which he gets going."""
@@ -171,7 +171,7 @@ LUNGE, PACE = 0.3, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Something that waits for its time."""
+    """A place or a pose that waits for its time."""
 
     command: Reach | Pose
     due: int
@@ -181,7 +181,7 @@ class Target:
 
     @property
     def first(self) -> int:
-        """The frame from which on it is asked of windows."""
+        """The frame from which on windows have it."""
         return self.due - (NEAR if isinstance(self.command, Reach) else NEAR_POSE)
 
 

@@ -1,9 +1,9 @@
-"""`Live`: one pose after the other, without end, and what is asked in between changes what comes.
+"""`Live`: one pose after the other, without end, and commands in between change what comes.
 
-There is one plan: the frames that were sampled and not yet shown. When something is asked, or when the plan runs short,
+There is one plan: the frames that were sampled and not yet shown. After a command, or when the plan runs short,
 a window is sampled from the next frame on (`window`), knowing the last half second; its body follows from the poses
 that were shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at
-the same frames make the same motion. What was made and not shown yet can be made anew from any of its frames (`Mark`).
+the same frames give the same motion. What was sampled and not shown can be computed anew from any frame (`Mark`).
 `clock` runs one of these against the time; `pair` has two people.
 """
 
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
-from motionloom.live.commands import Command, Taken
-from motionloom.live.person import Asked, Person, Request, State
+from motionloom.live.commands import Command, FrameCommand
+from motionloom.live.person import Controls, Person, Request, State
 from motionloom.live.settings import Settings
 from motionloom.live.window import Noise, Sampler
 from motionloom.motion import Motion
@@ -61,7 +61,7 @@ def motion_of(frames: Sequence[Frame], fps: float) -> Motion:
     return Motion(frames[0].skeleton, fps, root, turns)
 
 
-Shown = TypeVar("Shown", Frame, tuple[Frame, Frame])
+Frames = TypeVar("Frames", Frame, tuple[Frame, Frame])
 """What is shown at once: the frame of one person, or of both."""
 
 
@@ -74,11 +74,11 @@ class Mark:
     next: int
     """The next frame at 20 per second."""
     again: int
-    """When a window is sampled though nothing is asked."""
-    drawn: int
+    """When a window is sampled without a command."""
+    window: int
     """Where the last window began."""
     followed: int
-    """Where the last one began that took up what was asked."""
+    """Where the last one began that took up a command."""
     two: list[list[tuple[Array, Array, str]]]
     """The last two frames at 20 per second, of everybody."""
     people: tuple[State, ...]
@@ -91,11 +91,11 @@ class Undo:
     at: Mark
     """Where it went back to."""
     was: Mark
-    log: list[Taken]
+    log: list[FrameCommand]
     """What had been taken up between the two."""
 
 
-class Stage(ABC, Generic[Shown]):
+class Stage(ABC, Generic[Frames]):
     """One person or two who move without end: frames are counted, windows are sampled when they must be.
 
     Who is `tasks.watching.watching` may end a window between two network calls; `back` then goes to before its frame.
@@ -107,14 +107,12 @@ class Stage(ABC, Generic[Shown]):
         self.people, self.settings, self.fps = tuple(people), settings, float(fps)
         self._frame = 0  # the next one to be shown, at the rate of what is shown
         self._next = self._again = 0  # the next frame at 20 per second, and when to sample anew
-        self._drawn = (
-            self._followed
-        ) = -settings.used  # where the last window began, and the last that took up something
+        self._window = self._followed = -settings.used  # where the last window began, and the last with a command
         self._rest, self._open = settings.rest, True  # frames between windows; whether commands may be taken up
         self._two: list[list[tuple[Array, Array, str]]] = []  # the last two frames at 20 per second, of everybody
-        self._log: deque[Taken] = deque(maxlen=LOGGED)
-        self.fresh: list[Taken] = []
-        """What the last frame was the first to know of."""
+        self._log: deque[FrameCommand] = deque(maxlen=LOGGED)
+        self.fresh: list[FrameCommand] = []
+        """The commands that first changed the last frame."""
 
     @property
     def number(self) -> int:
@@ -127,37 +125,37 @@ class Stage(ABC, Generic[Shown]):
         """Guided calls of the network so far."""
 
     @abstractmethod
-    def __next__(self) -> Shown: ...
+    def __next__(self) -> Frames: ...
 
-    def __iter__(self) -> Iterator[Shown]:
+    def __iter__(self) -> Iterator[Frames]:
         return self
 
     def ask(self, command: Command, person: int | None = None) -> None:
-        """Ask for something from the next frame on: 0 or 1 of two people, or everybody (None)."""
+        """Send a command from the next frame on: to 0 or 1 of two people, or to everybody (None)."""
         for part, whom in self.addressed(command, person):
             self.people[whom].ask(part)
 
     def addressed(self, command: Command, person: int | None = None) -> list[tuple[Command, int]]:
-        """What each person is asked by a command that is for one of them or for everybody; changes nothing.
+        """The commands for each person in one that is for one of them or for everybody; changes nothing.
 
         Raises `MotionloomError` where there is no such person, or nobody of that size does it.
         """
         if person is not None and not 0 <= person < len(self.people):
             count = "one person" if len(self.people) == 1 else f"{len(self.people)} people"
             raise MotionloomError(f"there is no person {person + 1} in this session; it has {count}")
-        asked = [(command, whom) for whom in range(len(self.people)) if person in (None, whom)]
-        for part, whom in asked:
+        parts = [(command, whom) for whom in range(len(self.people)) if person in (None, whom)]
+        for part, whom in parts:
             self.people[whom].own(part)
-        return asked
+        return parts
 
     @property
-    def taken(self) -> list[Taken]:
-        """What was asked, with the frames that it first changed: asked before these frames of one of the same seed and
-        start, it makes the same motion again."""
+    def taken(self) -> list[FrameCommand]:
+        """The commands, with the frames that they first changed: sent before these frames to one of the same seed and
+        start, they give the same motion again."""
         return list(self._log)
 
     def stretch(self, seconds: float) -> int:
-        """Take up what is asked at least so many seconds apart, for machines that are slow; gives the frames back (at
+        """Take up commands at least so many seconds apart, for machines that are slow; returns the frames (at
         20 per second), which are not below those of the settings."""
         self._rest = min(max(int(np.ceil(seconds * FPS)), self.settings.rest), self.settings.used)
         return self._rest
@@ -167,17 +165,17 @@ class Stage(ABC, Generic[Shown]):
     def mark(self) -> Mark:
         """The present, to go back to."""
         states = tuple(person.state() for person in self.people)
-        return Mark(self._frame, self._next, self._again, self._drawn, self._followed, self._two, states)
+        return Mark(self._frame, self._next, self._again, self._window, self._followed, self._two, states)
 
     def back(self, mark: Mark) -> Undo:
-        """Go back to a mark: the next frame is that of the mark, and what was asked since is asked of it."""
+        """Go back to a mark: the next frame is that of the mark, and the commands since are sent to it."""
         undo = Undo(mark, self.mark(), [])
         while self._log and self._log[-1].frame >= mark.frame:
             undo.log.insert(0, self._log.pop())
         self._restore(mark)
         for i, (person, state) in enumerate(zip(self.people, mark.people, strict=True)):
-            person.restore(replace(state, asked=deque()))  # what waited then was taken up since, or waits still
-            for command in (*(one.command for one in undo.log if one.person == i), *undo.was.people[i].asked):
+            person.restore(replace(state, commands=deque()))  # what waited then was taken up since, or waits still
+            for command in (*(one.command for one in undo.log if one.person == i), *undo.was.people[i].commands):
                 person.ask(command)
         return undo
 
@@ -189,28 +187,28 @@ class Stage(ABC, Generic[Shown]):
         self._restore(undo.was)
 
     def _restore(self, mark: Mark) -> None:
-        self._frame, self._next, self._again, self._drawn = mark.frame, mark.next, mark.again, mark.drawn
+        self._frame, self._next, self._again, self._window = mark.frame, mark.next, mark.again, mark.window
         self._followed, self._two = mark.followed, mark.two
         for person, state in zip(self.people, mark.people, strict=True):
             person.restore(state)
 
     @property
-    def drawn(self) -> int:
+    def window(self) -> int:
         """Where the last window began, in frames at 20 per second."""
-        return self._drawn
+        return self._window
 
     def takes(self, mark: Mark) -> bool:
-        """Whether something asked at a mark is taken up there; it waits where something was taken up just before."""
+        """Whether a command at a mark is taken up there; it waits where another was taken up just before."""
         return mark.next >= mark.followed + self._rest
 
     @property
     def planned(self) -> bool:
-        """Whether the next frame is there already: nothing is sampled for it, unless something is asked."""
+        """Whether the next frame is there already: nothing is sampled for it, unless a command comes."""
         return self._needed()[0] < self._again
 
     @abstractmethod
     def _windows(self, requests: Sequence[Request]) -> None:
-        """Draw a window for everybody, from frame ``_next`` on."""
+        """Sample a window for everybody, from frame ``_next`` on."""
 
     def frames(self) -> tuple[Frame, ...]:
         """The next frame of everybody."""
@@ -218,9 +216,9 @@ class Stage(ABC, Generic[Shown]):
         last, part = self._needed()
         while self._next <= last:
             self._two = [*self._two, self._advanced()][-2:]
-        shown = tuple(self._between(person, i, part) for i, person in enumerate(self.people))
+        frames = tuple(self._between(person, i, part) for i, person in enumerate(self.people))
         self._frame += 1
-        return shown
+        return frames
 
     def _needed(self) -> tuple[int, float]:
         """The last frame at 20 per second that the next one needs, and how far it is behind the one before that; 0
@@ -245,18 +243,20 @@ class Stage(ABC, Generic[Shown]):
         take = take and self._next >= self._followed + self._rest
         if take or self._next >= self._again:
             requests = [person.request(self._next, take=take) for person in self.people]
-            self.fresh += [Taken(self._frame, asked, i) for i, one in enumerate(requests) for asked in one.taken]
+            self.fresh += [
+                FrameCommand(self._frame, command, i) for i, one in enumerate(requests) for command in one.commands
+            ]
             self._log += self.fresh
             self._windows(requests)
-            self._drawn, self._again = self._next, self._next + min(request.again for request in requests)
+            self._window, self._again = self._next, self._next + min(request.again for request in requests)
             self._followed = self._next if take else self._followed
-        made = [person.pose_at(self._next) for person in self.people]
+        poses = [person.pose_at(self._next) for person in self.people]
         self._next += 1
-        return made
+        return poses
 
 
-class Live(Stage[Frame], Asked):
-    """Somebody who moves without end and does what is asked.
+class Live(Stage[Frame], Controls):
+    """A person who moves without end and follows commands.
 
     live = Live(Prior.load(), seed=1)
     live.say("a person walks forward")
@@ -280,7 +280,7 @@ class Live(Stage[Frame], Asked):
         """prior: weights that make HumanML3D's 263 numbers. fps: rate of the frames that are shown, 1 to 240; motion is
         sampled at 20 per second and interpolated. start: a motion of anybody that this goes on from, in its place;
         without one the person begins at the origin facing +Z. skeleton: a humanoid that frames are shown on (None: the
-        22-joint person). metre: metres of what is asked (places, speeds) that one of the 22-joint person's becomes,
+        22-joint person). metre: metres of the commands (places, speeds) that one of the 22-joint person's becomes,
         such as a robot's `metre`. Raises `MotionloomError` for what cannot be.
         """
         check(prior, seed)

@@ -1,4 +1,4 @@
-"""The JSON messages of a live connection: what a client may say, checked, and what it is answered (docs/live.md)."""
+"""The JSON messages of a live connection: those of a client, checked, and the answers (docs/live.md)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
 from motionloom.live.clock import Health, first_of
-from motionloom.live.commands import Taken, to_json
+from motionloom.live.commands import FrameCommand, to_json
 from motionloom.live.live import Frame
 from motionloom.requests import reading
 from motionloom.requests.live import Hello
@@ -22,7 +22,7 @@ VERSION = 1
 LARGEST = 256 * 1024
 """Bytes of one message."""
 ROBOT_FPS = 50.0
-"""Frames per second of joint angles, unless hello says otherwise."""
+"""Frames per second of joint angles, unless hello has another rate."""
 MOST_JOINTS = 300
 
 
@@ -30,33 +30,33 @@ def read(text: str | bytes) -> Mapping[str, Any]:
     """A message: a JSON object with a type. `MotionloomError` for anything else."""
     if len(text) > LARGEST:
         raise MotionloomError(f"a message has at most {LARGEST} bytes; this one has {len(text)}")
-    said = parse_json(text, "the message")
-    if not isinstance(said, dict) or not isinstance(said.get("type"), str):
+    message = parse_json(text, "the message")
+    if not isinstance(message, dict) or not isinstance(message.get("type"), str):
         raise MotionloomError('a message is a JSON object with a "type"')
-    return said
+    return message
 
 
-def hello(said: Mapping[str, Any]) -> Hello:
+def hello(message: Mapping[str, Any]) -> Hello:
     """The first message of a client; `MotionloomError` names what is wrong with it."""
-    if said.get("type") != "hello":
+    if message.get("type") != "hello":
         raise MotionloomError('the first message is {"type": "hello"}')
-    given = {key: value for key, value in said.items() if key != "type"}
-    found = reading.read(Hello, given, "hello")
-    if found.robot and "skeleton" in given:
+    fields = {key: value for key, value in message.items() if key != "type"}
+    keys = reading.read(Hello, fields, "hello")
+    if keys.robot and "skeleton" in fields:
         raise MotionloomError("a robot has its own skeleton; leave one of 'robot' and 'skeleton' out of hello")
-    if not found.robot and (found.max_speed, found.avoid_collisions) != (None, None):
+    if not keys.robot and (keys.max_speed, keys.avoid_collisions) != (None, None):
         raise MotionloomError("'max_speed' and 'avoid_collisions' go with a 'robot'; name one in hello")
-    fps = ROBOT_FPS if found.robot and "fps" not in given else found.fps
-    return replace(found, skeleton=skeleton(found.skeleton), fps=fps)
+    fps = ROBOT_FPS if keys.robot and "fps" not in fields else keys.fps
+    return replace(keys, skeleton=skeleton(keys.skeleton), fps=fps)
 
 
-def skeleton(said: Any) -> Skeleton:
+def skeleton(value: Any) -> Skeleton:
     """A skeleton by its name (`retarget.named`), or of names, parents and offsets in metres."""
-    if isinstance(said, str):
-        return named_skeleton(said)
-    if not isinstance(said, dict) or set(said) != {"names", "parents", "offsets"}:
+    if isinstance(value, str):
+        return named_skeleton(value)
+    if not isinstance(value, dict) or set(value) != {"names", "parents", "offsets"}:
         raise MotionloomError("a skeleton is a name, or an object with names, parents and offsets")
-    names, parents, offsets = said["names"], said["parents"], said["offsets"]
+    names, parents, offsets = value["names"], value["parents"], value["offsets"]
     if not all(isinstance(part, list) and len(part) <= MOST_JOINTS for part in (names, parents, offsets)):
         raise MotionloomError(f"a skeleton has lists of names, parents and offsets, of at most {MOST_JOINTS} joints")
     if not all(isinstance(name, str) for name in names) or any(type(parent) is not int for parent in parents):
@@ -88,13 +88,13 @@ def welcome(begun: Hello, key: str, number: int, hinges: Sequence[str] = ()) -> 
     }
 
 
-def frame(shown: Frame | tuple[Frame, Frame], late: float, angles: Sequence[Array] = ()) -> dict[str, Any]:
+def frame(frames: Frame | tuple[Frame, Frame], late: float, angles: Sequence[Array] = ()) -> dict[str, Any]:
     """One pose, or those of two people: root in metres, rotations (w, x, y, z) in the parent's frame; late: seconds
     behind its time; angles: (7 + hinges,) of each, of a robot."""
-    first = first_of(shown)
+    first = first_of(frames)
     poses = [
         {"root": one.root.round(5).tolist(), "rotations": one.rotations.round(6).tolist(), "words": one.words}
-        for one in ((shown,) if isinstance(shown, Frame) else shown)
+        for one in ((frames,) if isinstance(frames, Frame) else frames)
     ]
     for pose, one in zip(poses, angles):
         pose["qpos"] = one.round(6).tolist()
@@ -116,11 +116,11 @@ def health(state: Health) -> dict[str, Any]:
     }
 
 
-def recorded(begun: Hello, taken: list[Taken], number: int) -> dict[str, Any]:
-    """What was asked so far, before which frames: the session again, with the same seed and rate."""
+def recorded(begun: Hello, log: list[FrameCommand], number: int) -> dict[str, Any]:
+    """The commands so far, before which frames: the session again, with the same seed and rate."""
     commands = [
         {"frame": one.frame, **to_json(one.command), **({"person": one.person + 1} if begun.people > 1 else {})}
-        for one in taken[-10_000:]
+        for one in log[-10_000:]
     ]
     return {
         "type": "recorded",

@@ -1,6 +1,6 @@
-"""`LivePair`: two people who move without end in one world, and what is asked of either changes what comes.
+"""`LivePair`: two people who move without end in one world, and commands to either change what comes.
 
-Both are sampled together by one frozen prior and the block that makes two people of it (`tasks.pair`): each window
+Both are sampled together by one frozen prior and the block for two people (`tasks.pair`): each window
 knows the last half second of both and their relative pose. Their bodies follow as one person's does.
 """
 
@@ -36,7 +36,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
     for first, second in pair:
         ...
 
-    What is asked of one of them is asked of `people[0]` or `people[1]`, as of a `Live`.
+    Commands for one of them go to `people[0]` or `people[1]`, as to a `Live`.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         metre: float = 1.0,
         settings: Settings | None = None,
     ) -> None:
-        """block: weights that make two people of this prior. start: what both did before, in one world; without it
+        """block: weights for two people with this prior. start: what both did before, in one world; without it
         the first person begins at the origin facing +Z and the words say where the second stands. skeleton: both are
         shown on it. Otherwise as `Live`.
         The solver and how the levels are spread are those of every duet. Raises `MotionloomError` for what cannot be.
@@ -68,7 +68,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         self.ask(Say(text))
 
     def addressed(self, command: Command, person: int | None = None) -> list[tuple[Command, int]]:
-        """As of `Stage`; words for everybody may say what each does, "A :: B"."""
+        """As of `Stage`; words for everybody may have a part for each, "A :: B"."""
         if isinstance(command, Say) and person is None and command.text:
             first, second = prompts_of(command.text)
             return [(Say(first), 0), (Say(second), 1)]
@@ -87,10 +87,10 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         count, frames, prior = len(requests[0].known), self.settings.ahead, self._prior
         known = np.stack([request.known.features for request in requests]).astype(np.float32)
         changes: list[Correction | None] = [None, None]
-        given = None
+        observed = None
         if count:
             begins = np.stack([request.known.begin.numbers() for request in requests])
-            given = known_state(
+            observed = known_state(
                 self._net, PairMotion.stack([PairMotion(known, relative(begins[0], begins))]), count + frames
             )
         for i, request in enumerate(requests):
@@ -103,12 +103,12 @@ class LivePair(Stage[tuple[Frame, Frame]]):
             [request.words for request in requests],
             count + frames,
             seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)],
-            edits=PairEdits(given, changes, frozen=frozen),
+            edits=PairEdits(observed, changes, frozen=frozen),
             sampling=PairSampling(guidance=self.settings.guidance, steps=self.settings.steps),
         )
         self._calls += self.settings.steps
-        made = sampled.features[0].astype(np.float64)
+        features = sampled.features[0].astype(np.float64)
         for i, (person, request) in enumerate(zip(self.people, requests, strict=True)):
-            window = np.concatenate([request.known.features, made[i, count:]])
+            window = np.concatenate([request.known.features, features[i, count:]])
             begin = None if count else GroundPose.of_numbers(sampled.poses[0, i])
             person.accept(request, window, self._next, begin)

@@ -1,4 +1,4 @@
-"""One person of a live motion: what is asked of him, the frames sampled for him, and the body that was shown."""
+"""One person of a live motion: its commands, the frames sampled for it, and the body that was shown."""
 
 import math
 import re
@@ -18,7 +18,7 @@ from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, overlaid, turn_between
 from motionloom.goals.paths import WALKING
 from motionloom.ground import GroundPose
-from motionloom.live.body import body, put
+from motionloom.live.body import body, transfer
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, scaled
 from motionloom.live.course import (
     ARRIVED,
@@ -42,22 +42,22 @@ from motionloom.weights.prior import Prior
 Array = NDArray[np.float64]
 
 STAY = 4
-"""Frames that a joint is asked to stay where it was asked to be."""
+"""Frames that a joint stays where a command wants it."""
 GOES = 0.15
-"""Metres per second from which on somebody who is steered goes somewhere."""
+"""Metres per second from which on a steered person goes somewhere."""
 RUNS = 1.6
-"""Metres per second from which on somebody who is to stand still first slows down: words alone stop a runner in half a
+"""Metres per second from which on a person who is to stand still first slows down: words alone stop a runner in half a
 second."""
 MOST_ASKED = 64
 """Commands, and things to reach, that wait at once; of more the oldest are dropped."""
 
 
-class Asked(ABC):
-    """What can be asked, as methods."""
+class Controls(ABC):
+    """The commands, as methods."""
 
     @abstractmethod
     def ask(self, command: Command) -> None:
-        """Ask for something from the next frame on."""
+        """Send a command that takes effect from the next frame on."""
 
     def say(self, text: str) -> None:
         """Do this from now on, such as "a person walks"; empty words leave it to the steering what is done."""
@@ -82,8 +82,8 @@ class Asked(ABC):
         of a motion of the 22-joint person.
         """
         if isinstance(places, Motion):
-            seen = places.frames(0, 1).positions()
-            places = ground_pose(seen[0]).from_world(seen)[0]
+            positions = places.frames(0, 1).positions()
+            places = ground_pose(positions[0]).from_world(positions)[0]
         self.ask(Pose(tuple(map(tuple, np.asarray(places, dtype=np.float64).tolist())), within))
 
 
@@ -99,8 +99,8 @@ class Request:
     """As of `window.Sampler`."""
     again: int
     """Frames after which to sample again."""
-    taken: list[Command]
-    """What was asked that this window is the first to know of."""
+    commands: list[Command]
+    """The commands that this window is the first to know of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +111,14 @@ class _Plan:
     placed: PlacedMotion
     motion: Motion
     """The same as a body."""
-    shown: Motion
-    """The same on the skeleton that is shown."""
+    clip: Motion
+    """The same on the skeleton of the frames."""
     words: str
 
 
 @dataclass(frozen=True, eq=False)
 class _Due:
-    """Something that windows are asked for: how somebody is in one frame."""
+    """Something that windows must meet: how the person is in one frame."""
 
     frame: int
     command: Reach | Pose
@@ -128,7 +128,7 @@ class _Due:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A person before some frame: all that changes while he moves, by the names that it has in him."""
+    """A person before some frame: all that changes in motion, by the names of the person's attributes."""
 
     plan: _Plan | None
     words: str
@@ -136,12 +136,12 @@ class State:
     trail: Trail | None
     targets: deque[Target]
     goes_to: Target | None
-    stands: int
+    until: int
     due: deque[_Due]
-    asked: deque[Command]
+    commands: deque[Command]
 
 
-class Person(Asked):
+class Person(Controls):
     """One of those who move. Frames are counted at 20 per second."""
 
     def __init__(
@@ -153,28 +153,30 @@ class Person(Asked):
         skeleton: Skeleton | None,
         metre: float = 1.0,
     ) -> None:
-        """metre: of what is asked that one of the person's becomes; otherwise as `live.Live`."""
+        """metre: that of the commands in the person's metres; otherwise as `live.Live`."""
         self._metre = metre
         self._prior, self._settings, self.skeleton = prior, settings, skeleton or SMPL22
         self._words, self._steer = "", Steer()
         self._trail: Trail | None = None
-        self._targets: deque[Target] = deque(maxlen=MOST_ASKED)  # what is to be reached, and is not asked of windows
-        self._goes_to: Target | None = None  # that which the trail leads to
-        self._stands = 0  # the frame until which somebody who has come to a place stands there
-        self._asked: deque[Command] = deque()
+        self._targets: deque[Target] = deque(
+            maxlen=MOST_ASKED
+        )  # what is to be reached, and is not a goal of windows yet
+        self._goes_to: Target | None = None  # that to which the trail goes
+        self._until = 0  # the frame until which a person who has come to a place stands there
+        self._commands: deque[Command] = deque()
         self._due: deque[_Due] = deque(maxlen=MOST_ASKED)
         self._plan: _Plan | None = None if start is None else self._begun(start)
 
     def ask(self, command: Command) -> None:
-        """Ask for something from the next frame on; of several steerings or sentences for one frame the last counts."""
+        """As of `Controls.ask`; of several steerings or sentences for one frame the last counts."""
         self.own(command)
-        last = self._asked[-1] if self._asked else None
+        last = self._commands[-1] if self._commands else None
         if isinstance(command, Reach | Pose) or type(last) is not type(command):
-            self._asked.append(command)
+            self._commands.append(command)
         else:
-            self._asked[-1] = command
-        while len(self._asked) > MOST_ASKED:
-            self._asked.popleft()
+            self._commands[-1] = command
+        while len(self._commands) > MOST_ASKED:
+            self._commands.popleft()
 
     def own(self, command: Command) -> Command:
         """A command in the metres of the 22-joint person; `MotionloomError` where that is out of anybody's reach."""
@@ -182,15 +184,15 @@ class Person(Asked):
 
     @property
     def waiting(self) -> bool:
-        """Whether something was asked that no window knows of."""
-        return bool(self._asked)
+        """Whether there is a command that no window knows of."""
+        return bool(self._commands)
 
     def state(self) -> State:
         """What `restore` brings back."""
         return State(*(copy(getattr(self, f"_{one.name}")) for one in fields(State)))
 
     def restore(self, state: State) -> None:
-        """Be as in a state; what was asked since is forgotten."""
+        """Be as in a state; later commands are forgotten."""
         for one in fields(State):
             setattr(self, f"_{one.name}", copy(getattr(state, one.name)))
 
@@ -198,7 +200,7 @@ class Person(Asked):
         """Root (3,), rotations (joints, 4) and words of a frame of the plan."""
         assert self._plan is not None
         k = frame - self._plan.first
-        return self._plan.shown.root[k], self._plan.shown.rotations[k], self._plan.words
+        return self._plan.clip.root[k], self._plan.clip.rotations[k], self._plan.words
 
     # Planning
 
@@ -206,41 +208,39 @@ class Person(Asked):
         """A plan that is over: the end of a motion of anybody, behind which frame 0 is."""
         placed = last_frames(start)
         motion = body(placed.positions, placed.contacts, FPS, None)
-        return _Plan(-len(placed), placed, motion, put(motion, self.skeleton, None), STANDS)
+        return _Plan(-len(placed), placed, motion, transfer(motion, self.skeleton, None), STILL)
 
     def request(self, frame: int, *, take: bool) -> Request:
-        """What the window from ``frame`` on must be; with ``take`` what was asked is taken up."""
+        """What the window from ``frame`` on must be; with ``take`` the commands are taken up."""
         known = PlacedMotion.nothing()
         if (plan := self._plan) is not None:
             end = frame - plan.first
             known = plan.placed.crop(max(0, end - self._settings.known), end)
         course = _course(known)
-        taken: list[Command] = []
-        while take and self._asked:
-            taken.append(self._asked.popleft())
-            self._take_up(self.own(taken[-1]), frame, course)
-        goal, words, again = self._wanted(frame, course)
+        commands: list[Command] = []
+        while take and self._commands:
+            commands.append(self._commands.popleft())
+            self._take_up(self.own(commands[-1]), frame, course)
+        goal, words, again = self._plan_window(frame, course)
         edits: list[Correction] = []
         turns: list[Correction] = []
         if not goal.empty:
             edits.append(toward(goal.relative_to(course.place), self._prior, first=len(known), known=True))
         if self._trail is None and self._steer.speed is None and self._steer.direction is not None:
             turns.append(heading_for(self._steer.direction - course.place.facing, self._prior, first=len(known)))
-        return Request(known, words, edits, turns, again, taken)
+        return Request(known, words, edits, turns, again, commands)
 
     def accept(self, request: Request, features: Array, frame: int, begin: GroundPose | None = None) -> None:
         """Take a window (known and sampled frames, 263) for the plan; ``begin`` where nothing was known."""
         count = len(request.known)
         placed = PlacedMotion(features, begin or request.known.begin)
-        old = self._plan
-        if old is None:
-            motion = body(placed.positions, placed.contacts, FPS, None)
-            shown = put(motion, self.skeleton, None)
-        else:
-            part = slice(frame - old.first - count, frame - old.first)
-            motion = body(placed.positions, placed.contacts, FPS, old.motion.frames(part.start, part.stop))
-            shown = put(motion, self.skeleton, old.shown.frames(part.start, part.stop))
-        self._plan = _Plan(frame - count, placed, motion, shown, request.words)
+        pasts: tuple[Motion | None, Motion | None] = (None, None)
+        if (old := self._plan) is not None:
+            last = frame - old.first
+            pasts = old.motion.frames(last - count, last), old.clip.frames(last - count, last)
+        motion = body(placed.positions, placed.contacts, FPS, pasts[0])
+        clip = transfer(motion, self.skeleton, pasts[1])
+        self._plan = _Plan(frame - count, placed, motion, clip, request.words)
 
     def _take_up(self, command: Command, frame: int, course: Course) -> None:
         if isinstance(command, Say):
@@ -256,7 +256,7 @@ class Person(Asked):
 
     def _go(self, steer: Steer, trail: Trail | None, goes_to: Target | None = None) -> None:
         """Go another way than before; what was gone to is given up."""
-        self._steer, self._trail, self._goes_to, self._stands = steer, trail, goes_to, 0
+        self._steer, self._trail, self._goes_to, self._until = steer, trail, goes_to, 0
         self._targets = deque((one for one in self._targets if not one.near), maxlen=MOST_ASKED)
 
     @property
@@ -265,7 +265,7 @@ class Person(Asked):
         return self._steer.direction is not None if self._steer.speed is None else self._steer.speed > GOES
 
     def _goal_of(self, command: Reach | Pose, there: GroundPose) -> Goal:
-        """Of one frame, for somebody who is there then."""
+        """Of one frame, for a person who is ``there`` then."""
         goal = Goal.nothing(1)
         if isinstance(command, Reach):
             joint = SMPL22.index(command.joint)
@@ -288,7 +288,7 @@ class Person(Asked):
         return GroundPose(there.x + beyond * x, there.z + beyond * z, there.facing)
 
     def _look_at_targets(self, frame: int, course: Course) -> int:
-        """Ask windows for what is near, walk to what is not; gives the frames after which to look again."""
+        """Leave what is near to windows, walk to what is not; returns the frames after which to look again."""
         again = self._settings.used
         waiting, self._targets = self._targets, deque(maxlen=MOST_ASKED)
         for target in waiting:
@@ -304,7 +304,7 @@ class Person(Asked):
             far = isinstance(command, Reach) and not target.near and not within_reach(command, there, left)
             if not far and not early:
                 self._due.append(_Due(target.due, command, there))
-            elif not far or self._goes_to is not None or self._stands > frame:
+            elif not far or self._goes_to is not None or self._until > frame:
                 self._targets.append(target)
             else:
                 assert isinstance(command, Reach)
@@ -312,8 +312,8 @@ class Person(Asked):
         return again
 
     def _still_due(self, frame: int, course: Course) -> Iterator[_Due]:
-        """What is asked of the next window: a pose comes along with somebody, and what he has left behind is walked to,
-        unless he is steered elsewhere."""
+        """What the next window must meet: a pose comes along with the person, who walks back to what was passed, unless
+        steered elsewhere."""
         for due in self._due:
             left, there = due.frame - frame, self._place_in(due.frame, course)
             if left + STAY <= 0:
@@ -326,22 +326,22 @@ class Person(Asked):
                 self._targets.append(Target(due.command, due.frame))
 
     def _arrive(self, frame: int, course: Course) -> None:
-        """End a trail that is over; who has gone to something stands there until he has reached it."""
+        """End a trail that is over; whoever has gone to something stands there until it is reached."""
         if self._trail is None or self._trail.left(course, frame) > ARRIVED:
             return
         target, self._trail, self._goes_to = self._goes_to, None, None
         if target is not None:
             due = max(target.due, frame + SOON)
             self._targets.appendleft(Target(target.command, due, near=True))
-            self._stands = due + STAY
+            self._until = due + STAY
 
-    def _wanted(self, frame: int, course: Course) -> tuple[Goal, str, int]:
-        """What is asked of the next frames, in the world; the words; and after how many frames to sample again."""
+    def _plan_window(self, frame: int, course: Course) -> tuple[Goal, str, int]:
+        """The goal of the next frames, in the world; the words; and after how many frames to sample again."""
         frames = self._settings.ahead
         self._arrive(frame, course)
         again = self._look_at_targets(frame, course)
-        if self._stands > frame:
-            again = min(again, self._stands - frame)
+        if self._until > frame:
+            again = min(again, self._until - frame)
         if self._trail is not None:
             goal, over = self._trail.goal(course, frames, FPS, frame=frame)
             again = min(again, over)
@@ -353,12 +353,12 @@ class Person(Asked):
             one = self._goal_of(due.command, due.there)
             for k in range(max(due.frame - frame, 0), min(due.frame + STAY - frame, frames)):
                 goal = overlaid(one.padded(k, frames - k - 1), goal)
-        return goal, self._said(frame), max(self._settings.rest, again)
+        return goal, self._words_at(frame), max(self._settings.rest, again)
 
-    def _said(self, frame: int) -> str:
+    def _words_at(self, frame: int) -> str:
         """The words for what is done from a frame on; those that go nowhere are not for somebody who goes."""
-        if self._stands > frame:
-            return STANDS
+        if self._until > frame:
+            return STILL
         steer, words = self._steer, self._words
         if self._trail is not None:
             pace, away = self._trail.speed, self._goes_to is not None
@@ -377,9 +377,9 @@ def _course(known: PlacedMotion) -> Course:
     return Course(end, ((end.x - back.x) / count, (end.z - back.z) / count))
 
 
-STANDS = "a person stands still"
+STILL = "a person stands still"
 _FORWARD = (
-    (0.15, STANDS),
+    (0.15, STILL),
     (1.9, "a person walks forward"),
     (2.4, "a person jogs slowly"),
     (math.inf, "a person runs forward"),
@@ -395,15 +395,15 @@ _EITHER = re.compile(rf"\b(?:(?P<staying>{_STAYING})|{_GOING})\b", re.IGNORECASE
 
 
 def stays(words: str) -> bool:
-    """Whether words end with somebody who stays where he is: stands, sits or lies. The last of several verbs counts."""
-    found = list(_EITHER.finditer(words))
-    return bool(found) and found[-1]["staying"] is not None
+    """Whether words end with staying in place: standing, sitting or lying. The last of several verbs counts."""
+    verbs = list(_EITHER.finditer(words))
+    return bool(verbs) and verbs[-1]["staying"] is not None
 
 
 def for_pace(speed: float, direction: float | None, facing: float | None) -> str:
     """speed: metres per second; direction, facing: radians in the world, None where they are one."""
     words = next(words for most, words in _FORWARD if speed < most)
-    if words == STANDS or direction is None or facing is None:
+    if words == STILL or direction is None or facing is None:
         return words
     off = abs(float(turn_between(direction, facing)))
     if off > math.radians(130):

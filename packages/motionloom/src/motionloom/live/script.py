@@ -1,4 +1,4 @@
-"""A scripted session: a YAML file that says what is asked when, for films and tests.
+"""A scripted session: a YAML file of commands and their times, for films and tests.
 
     seconds: 12
     seed: 3
@@ -11,8 +11,6 @@ Times are seconds; what the commands hold is what their JSON objects hold (`comm
 command may name its ``person``, 1 or 2; without that it is for both.
 """
 
-import json
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +20,7 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.fields import LinedFile
 from motionloom.goals.roles import prompts_of
 from motionloom.io.lined_yaml import Lined, read_lined
-from motionloom.live.commands import Command, Say, from_json, person_of, to_json
+from motionloom.live.commands import Command, Say, from_json, person_of
 from motionloom.live.live import Frame, Stage
 from motionloom.requests.fields import specs
 from motionloom.requests.live import ScriptKeys, TimedKeys
@@ -34,7 +32,7 @@ _TYPES = ("say", "steer", "path", "reach", "pose")
 
 
 class Timed(NamedTuple):
-    """What is asked at a time."""
+    """A command at a time."""
 
     at: float
     """Seconds."""
@@ -45,7 +43,7 @@ class Timed(NamedTuple):
 
 @dataclass(frozen=True)
 class Script:
-    """What is asked when."""
+    """Commands and their times."""
 
     seconds: float
     commands: tuple[Timed, ...]
@@ -55,7 +53,7 @@ class Script:
     """1 or 2."""
 
     def run(self, live: Stage) -> Iterator[tuple[Frame, ...]]:
-        """The frames of everybody, each command asked before the frames of its time."""
+        """The frames of everybody, each command sent before the frames of its time."""
         waiting = list(self.commands)[::-1]
         for number in range(max(1, round(self.seconds * live.fps))):
             while waiting and waiting[-1].at * live.fps <= number + 1e-6:
@@ -70,37 +68,14 @@ def read_script(path: Path | str) -> Script:
     return _Reader(path).script(read_lined(path, max_bytes=MAX_BYTES))
 
 
-def written(script: Script) -> str:
-    """The text of a script file that `read_script` reads as this script."""
-    lines = [f"seconds: {script.seconds:g}", f"seed: {script.seed}"]
-    lines += [f"people: {script.people}"] if script.people > 1 else []
-    lines += ["commands:" if script.commands else "commands: []"]
-    for at, command, person in script.commands:
-        whom = {} if person is None else {"person": person + 1}
-        said = to_json(command)
-        kind = said.pop("type")
-        value = said["text"] if kind == "say" else said
-        lines.append(f"  - {_PAIR.sub(_whole, json.dumps({'at': round(at, 6), **whom, kind: value}))}")
-    return "\n".join(lines) + "\n"
-
-
-_PAIR = re.compile(r"\\u(d[89ab]..)\\u(d[c-f]..)")
-"""A letter beyond the first 65,536 as JSON writes it; YAML has another way."""
-
-
-def _whole(pair: re.Match[str]) -> str:
-    high, low = (int(part, 16) for part in pair.groups())
-    return f"\\U{0x10000 + ((high - 0xD800) << 10) + (low - 0xDC00):08x}"
-
-
 @dataclass(frozen=True)
 class _Reader(LinedFile):
-    def script(self, found: Lined) -> Script:
+    def script(self, root: Lined) -> Script:
         keys = specs(ScriptKeys)
-        parts = self.mapping(found, tuple(keys), "a live script")
+        parts = self.mapping(root, tuple(keys), "a live script")
         seconds, seed, people = (self.field(parts, keys, name) for name in ("seconds", "seed", "people"))
         if seconds is None:
-            self.fail(found.line, "a live script says how long it is: give 'seconds'")
+            self.fail(root.line, "a live script says how long it is: give 'seconds'")
         listed = parts.get("commands")
         entries: Sequence[Lined] = []
         if listed is not None and listed.value != []:
@@ -117,8 +92,8 @@ class _Reader(LinedFile):
         if at is None or len(kinds) != 1:
             self.fail(entry.line, f"a command has a time 'at' and one of {', '.join(_TYPES)}")
         value = parts[kinds[0]]
-        said = value.plain()
-        fields = {"text": said} if kinds[0] == "say" else {} if said is None else said
+        data = value.plain()
+        fields = {"text": data} if kinds[0] == "say" else {} if data is None else data
         if not isinstance(fields, dict):
             self.fail(value.line, f"'{kinds[0]}' must be a mapping; got {self.kind(value)}")
         whom = person_of({"person": self.field(parts, keys, "person")})

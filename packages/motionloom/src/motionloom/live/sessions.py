@@ -24,7 +24,7 @@ from motionloom.weights.prior import Prior
 Array = NDArray[np.float64]
 MOST = 4
 """Sessions at once, those that wait for their client included."""
-KEPT = 120.0
+WAIT = 120.0
 """Seconds that a session waits for its client to come back."""
 
 
@@ -51,21 +51,21 @@ class Session:
         """Names of the robot's hinges, where there is one."""
         return self.robots[0].robot.file.joint_names() if self.robots else ()
 
-    def follow(self, found: Frame | tuple[Frame, ...]) -> list[Array]:
+    def follow(self, frames: Frame | tuple[Frame, ...]) -> list[Array]:
         """(7 + hinges,) for each of the people: what the robots do in a frame, which comes after the one before."""
-        people = (found,) if isinstance(found, Frame) else found
+        people = (frames,) if isinstance(frames, Frame) else frames
         return [robot.pose(motion_of([one], robot.fps)) for robot, one in zip(self.robots, people, strict=True)]
 
 
 @dataclass(eq=False)
 class Sessions:
-    """All live sessions of one server; asked from any thread."""
+    """All live sessions of one server; used from any thread."""
 
     prior: Callable[[], Prior]
     """Gives the weights, called in the thread of the first session (it may take seconds)."""
     _: KW_ONLY
     block: Callable[[Prior], PairBlock] = lambda prior: PairBlock.load("duet", prior)
-    """Gives what makes two people of them; `MotionloomError` where there is none for these weights."""
+    """Gives the block for two people; `MotionloomError` where there is none for these weights."""
     most: int = MOST
     settings: Settings | None = None
     robots: Mapping[str, Robot] = field(default_factory=dict)
@@ -73,18 +73,18 @@ class Sessions:
     _open: dict[str, Session] = field(default_factory=dict, init=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
-    def begin(self, asked: Hello) -> Session:
-        """A new session, or the one that ``asked`` names; `MotionloomError` where there is no room or none such."""
+    def begin(self, hello: Hello) -> Session:
+        """A new session, or the one that ``hello`` names; `MotionloomError` where there is no room or none such."""
         with self._lock:
             self._forget()
-            if asked.session:
-                return self._again(asked.session)
-            robots = self._followers(asked)
+            if hello.session:
+                return self._again(hello.session)
+            robots = self._followers(hello)
             if len(self._open) >= self.most and not self._make_room():
                 raise MotionloomError(f"this server plays {self.most} live sessions and no more; come back later")
-            asked = replace(asked, skeleton=robots[0].robot.skeleton) if robots else asked
+            hello = replace(hello, skeleton=robots[0].robot.skeleton) if robots else hello
             metre = robots[0].robot.metre if robots else 1.0
-            session = Session(secrets.token_urlsafe(16), asked, self._player(asked, metre).start(), robots)
+            session = Session(secrets.token_urlsafe(16), hello, self._player(hello, metre).start(), robots)
             self._open[session.key] = session
             return session
 
@@ -107,22 +107,22 @@ class Sessions:
     def __len__(self) -> int:
         return len(self._open)
 
-    def _followers(self, asked: Hello) -> tuple[Follower, ...]:
-        """A robot for each of the people, where one is asked for."""
-        if not asked.robot:
+    def _followers(self, hello: Hello) -> tuple[Follower, ...]:
+        """A robot for each of the people, where ``hello`` names one."""
+        if not hello.robot:
             return ()
-        if asked.robot not in self.robots:
+        if hello.robot not in self.robots:
             there = ", ".join(self.robots) or "none (motionloom serve --robot MODEL)"
-            raise MotionloomError(f"this server has no robot {quoted(asked.robot)}; it has {there}")
-        how = {"max_speed": asked.max_speed, "avoid_collisions": bool(asked.avoid_collisions)}
-        return tuple(Follower(self.robots[asked.robot], asked.fps, **how) for _ in range(asked.people))
+            raise MotionloomError(f"this server has no robot {quoted(hello.robot)}; it has {there}")
+        how = {"max_speed": hello.max_speed, "avoid_collisions": bool(hello.avoid_collisions)}
+        return tuple(Follower(self.robots[hello.robot], hello.fps, **how) for _ in range(hello.people))
 
-    def _player(self, asked: Hello, metre: float) -> Player[Any]:
+    def _player(self, hello: Hello, metre: float) -> Player[Any]:
         prior = self.prior()
-        shown = {"fps": asked.fps, "skeleton": asked.skeleton, "metre": metre, "settings": self.settings}
-        if asked.people == 1:
-            return Player(Live(prior, seed=asked.seed, **shown))
-        return Player(LivePair(prior, self.block(prior), seed=asked.seed, **shown))
+        options = {"fps": hello.fps, "skeleton": hello.skeleton, "metre": metre, "settings": self.settings}
+        if hello.people == 1:
+            return Player(Live(prior, seed=hello.seed, **options))
+        return Player(LivePair(prior, self.block(prior), seed=hello.seed, **options))
 
     def _again(self, key: str) -> Session:
         session = self._open.get(key)
@@ -136,7 +136,7 @@ class Sessions:
     def _forget(self) -> None:
         """End sessions whose clients did not come back in time."""
         for left, session in self._waiting():
-            if time.monotonic() - left > KEPT:
+            if time.monotonic() - left > WAIT:
                 self._open.pop(session.key).player.stop()
 
     def _make_room(self) -> bool:

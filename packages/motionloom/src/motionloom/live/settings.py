@@ -23,7 +23,7 @@ class Settings(Checked):
     ahead: int = declare("whole", "frames that a window samples", 60, low=11, high=180)
     used: int = declare("whole", "frames of a window that are shown when nothing is asked", 40, low=1, high=170)
     rest: int = declare("whole", "frames between two windows that take up what is asked", 4, low=1, high=170)
-    """What is asked more often is put together."""
+    """Commands that come more often are merged."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

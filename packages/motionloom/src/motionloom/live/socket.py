@@ -1,6 +1,6 @@
 """A live session over a WebSocket: messages in, poses out, for any ASGI server (docs/live.md).
 
-Two coroutines to a connection: one reads what the client says, no faster than `RATE`, so that a flood waits in the
+Two coroutines to a connection: one reads the client's messages, no faster than `RATE`, so that a flood waits in the
 client's own socket; one sends poses at their times, and stops while the client does not take them. Neither keeps more
 than the player's bounded queues do.
 """
@@ -21,7 +21,7 @@ from motionloom.live.sessions import Session, Sessions
 RATE, BURST = 200.0, 100.0
 """Messages per second that are read of one client, and how many at once after a rest."""
 MOST_WRONG = 50
-"""Wrong messages, not made good by ten right ones each, after which a client is sent away."""
+"""Wrong messages, each cancelled by ten right ones, after which a client is sent away."""
 FIRST = 10.0
 """Seconds in which a client must say hello."""
 STUCK = 30.0
@@ -47,25 +47,25 @@ class Gone(Exception):
 
 
 async def live_session(websocket: Socket, sessions: Sessions) -> None:
-    """Serve one client until it leaves; who comes back within `sessions.KEPT` goes on where he was."""
+    """Serve one client until it leaves; a client that comes back within `sessions.WAIT` goes on where it was."""
     await websocket.accept()
     session: Session | None = None
     try:
         async with asyncio.timeout(FIRST):
             first = await _text(websocket)
-        asked = messages.hello(messages.read(first))
-        session = await asyncio.to_thread(sessions.begin, asked)
+        hello = messages.hello(messages.read(first))
+        session = await asyncio.to_thread(sessions.begin, hello)
         await _send(websocket, messages.welcome(session.begun, session.key, session.number, session.hinges))
         await _both(_listen(websocket, session), _play(websocket, session))
         await asyncio.to_thread(sessions.end, session)
         session = None
         await _close(websocket, GOODBYE)
     except (MotionloomError, TimeoutError) as error:
-        said = str(error) or "nothing was said in time"
+        sentence = str(error) or "nothing was said in time"
         with suppress(Gone):
-            await _send(websocket, {"type": "error", "message": one_line(said)[:300], "last": True})
-        code = TRY_LATER if "come back later" in said else NOT_ALLOWED
-        await _close(websocket, code, one_line(said)[:100])
+            await _send(websocket, {"type": "error", "message": one_line(sentence)[:300], "last": True})
+        code = TRY_LATER if "come back later" in sentence else NOT_ALLOWED
+        await _close(websocket, code, one_line(sentence)[:100])
     except Gone:
         pass
     finally:
@@ -77,8 +77,8 @@ async def _both(first: Any, second: Any) -> None:
     """Until one of two coroutines ends; the other is ended with it, and an error of either is raised."""
     tasks = [asyncio.ensure_future(first), asyncio.ensure_future(second)]
     try:
-        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        for task in done:
+        ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in ended:
             task.result()
     finally:
         for task in tasks:
@@ -87,7 +87,7 @@ async def _both(first: Any, second: Any) -> None:
 
 
 async def _listen(websocket: Socket, session: Session) -> None:
-    """Take commands until the client says bye; raises MotionloomError where it says too much that is wrong."""
+    """Take commands until the client says bye; raises MotionloomError where it sends too much that is wrong."""
     room, wrong, last = BURST, 0.0, time.monotonic()
     while True:
         text = await _text(websocket)
@@ -106,17 +106,17 @@ async def _listen(websocket: Socket, session: Session) -> None:
             await _send(websocket, {"type": "error", "message": one_line(str(error))[:300]})
 
 
-async def _followed(websocket: Socket, session: Session, said: Mapping[str, Any]) -> bool:
-    """Do what one message says; False where it ends the session."""
-    kind = said["type"]
+async def _followed(websocket: Socket, session: Session, message: Mapping[str, Any]) -> bool:
+    """Follow one message; False where it ends the session."""
+    kind = message["type"]
     if kind == "bye":
         return False
     if kind == "ping":
-        await _send(websocket, {"type": "pong", "id": str(said.get("id", ""))[:100], "frame": session.number})
+        await _send(websocket, {"type": "pong", "id": str(message.get("id", ""))[:100], "frame": session.number})
     elif kind == "record":
         await _send(websocket, messages.recorded(session.begun, session.player.taken, session.number))
     else:
-        session.player.ask(from_json(said), person_of(said))
+        session.player.ask(from_json(message), person_of(message))
     return True
 
 
@@ -124,19 +124,19 @@ async def _play(websocket: Socket, session: Session) -> None:
     player = session.player
     pace, reported = Pace(time.monotonic, lambda: player.health.rate), time.monotonic()
     while True:
-        while (found := session.pending or player.coming(timeout=0.0)) is None:
+        while (poses := session.pending or player.coming(timeout=0.0)) is None:
             if player.ended:
                 raise MotionloomError("the live session ended")
             await asyncio.sleep(LOOK)
-        await asyncio.sleep(pace.until(first_of(found)))
+        await asyncio.sleep(pace.until(first_of(poses)))
         # what was taken is kept until it is sent: the client may go in between
         if session.pending is None:
-            session.pending = found = player.take() or found
-            session.angles = await asyncio.to_thread(session.follow, found) if session.robots else []
-        frame = first_of(found)
+            session.pending = poses = player.take() or poses
+            session.angles = await asyncio.to_thread(session.follow, poses) if session.robots else []
+        frame = first_of(poses)
         late = pace.late(frame)
-        player.shown(late)
-        await _send(websocket, messages.frame(found, late, session.angles))
+        player.count_frame(late)
+        await _send(websocket, messages.frame(poses, late, session.angles))
         session.number, session.pending = frame.number + 1, None
         if time.monotonic() - reported > EVERY:
             reported = time.monotonic()
@@ -146,18 +146,18 @@ async def _play(websocket: Socket, session: Session) -> None:
 async def _text(websocket: Socket) -> str | bytes:
     """The next message, as text or bytes; `Gone` where there is none."""
     try:
-        found = await websocket.receive()
+        message = await websocket.receive()
     except Exception as error:  # every server has its own for a client that is gone
         raise Gone from error
-    if found["type"] != "websocket.receive":
+    if message["type"] != "websocket.receive":
         raise Gone
-    text = found.get("text")
-    return text if text is not None else found.get("bytes") or b""
+    text = message.get("text")
+    return text if text is not None else message.get("bytes") or b""
 
 
-async def _send(websocket: Socket, said: Mapping[str, Any]) -> None:
+async def _send(websocket: Socket, message: Mapping[str, Any]) -> None:
     """Send one message; `Gone` where nobody takes it."""
-    text = json.dumps(said, separators=(",", ":"))
+    text = json.dumps(message, separators=(",", ":"))
     try:
         async with asyncio.timeout(STUCK):
             await websocket.send_text(text)

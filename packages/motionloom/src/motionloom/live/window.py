@@ -1,7 +1,7 @@
 """One window of a live motion: its first frames are known, the rest is sampled in a few steps.
 
 It is sampled as every other motion is (`tasks.sampling`), with what is known observed; the noise belongs to the numbers
-of frames: a frame that is sampled again, because something was asked, has the same noise.
+of frames: a frame that is sampled again, after a command, has the same noise.
 """
 
 from collections import OrderedDict
@@ -24,7 +24,7 @@ from motionloom.weights.prior import Prior
 TEXTS = 64
 """Prompts whose vectors are kept."""
 SETTLING = 0.9
-"""The noise of a level below which what is asked is met exactly, also where the way out of the known frames bent it."""
+"""The noise of a level below which goals are met exactly, also where the way out of the known frames bent it."""
 
 
 class Noise:
@@ -33,22 +33,22 @@ class Noise:
     def __init__(self, seed: int, moves: int, features: int) -> None:
         self._seed = seed
         self._shape = 2 * moves + 2, features  # each move takes noise, and what is known is shown at noise of its own
-        self._kept: dict[int, np.ndarray] = {}
+        self._noise: dict[int, np.ndarray] = {}
 
     def of(self, first: int, frames: int) -> NoiseSource:
         """The noise of the frames from ``first`` on, for one walk: its k-th call gets the k-th part."""
-        self._kept = {number: kept for number, kept in self._kept.items() if number >= first}
+        self._noise = {number: noise for number, noise in self._noise.items() if number >= first}
         for number in range(first, first + frames):
-            if number not in self._kept:
+            if number not in self._noise:
                 own = generator(row_seed(self._seed, number + (1 << 20)))
-                self._kept[number] = own.standard_normal(self._shape, np.float32)
-        whole = np.stack([self._kept[number] for number in range(first, first + frames)], axis=1)
+                self._noise[number] = own.standard_normal(self._shape, np.float32)
+        whole = np.stack([self._noise[number] for number in range(first, first + frames)], axis=1)
         calls = iter(range(len(whole)))
         return lambda like: whole[next(calls)][None].astype(like.dtype, copy=False)
 
 
 class Sampler:
-    """Samples windows with one prior; keeps the vectors of what was said last."""
+    """Samples windows with one prior; keeps the vectors of the last words."""
 
     def __init__(self, prior: Prior, settings: Settings) -> None:
         self.prior, self.settings = prior, settings
@@ -72,12 +72,12 @@ class Sampler:
 
         text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to sample; noise:
         of `Noise.of`, for all frames of the window; edits: what every estimate goes through, one after the other,
-        before it is made to leave the known frames without a jump; turns: the same behind that, for edits that jump
+        before it leaves the known frames without a jump; turns: the same behind that, for edits that jump
         nowhere.
         """
         prior, count, length = self.prior, len(known), len(known) + frames
-        given = zero_padded(known, length)[None]
-        mask = np.zeros(given.shape, np.bool_)
+        padded = zero_padded(known, length)[None]
+        mask = np.zeros(padded.shape, np.bool_)
         mask[:, :count] = True
         change = leaving(prior, known, frames, edits=edits, turns=turns)
 
@@ -98,13 +98,13 @@ class Sampler:
             self._sampling,
             guided=self._guided(text, length),
             edits=[changed],
-            observed=Observed((given - prior.mean) / prior.spread, mask),
+            observed=Observed((padded - prior.mean) / prior.spread, mask),
             view=View(poses),
         )
-        return np.where(mask[0], given[0], state * prior.spread + prior.mean).astype(np.float64)
+        return np.where(mask[0], padded[0], state * prior.spread + prior.mean).astype(np.float64)
 
     def _guided(self, text: str, frames: int) -> Denoiser:
-        """The prior's denoised estimate under a text; an empty one asks for nothing in particular. Guided early.
+        """The prior's denoised estimate under a text; an empty one is no condition. Guided early.
 
         A token of the network holds several frames, and between tokens it leaves small steps: the last estimate is the
         average over all ways to divide the frames into tokens (as in `tasks.long`), which are rows of one call.
@@ -147,11 +147,11 @@ def leaving(
 
     known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
     """
-    spread, given = prior.spread, zero_padded(known, len(known) + frames)[None]
-    mask = np.zeros(given.shape, np.bool_)
+    spread, padded = prior.spread, zero_padded(known, len(known) + frames)[None]
+    mask = np.zeros(padded.shape, np.bool_)
     mask[:, : len(known)] = True
-    meet = joining(given, mask, len(known), len(known) + frames)
-    data = (given - prior.mean) / spread
+    meet = joining(padded, mask, len(known), len(known) + frames)
+    data = (padded - prior.mean) / spread
 
     def changed(denoised: np.ndarray, level: int) -> np.ndarray:
         for edit in edits:

@@ -1,4 +1,4 @@
-"""`batch`: the columns of a row, and what is said of all rows of a job."""
+"""`batch`: the columns of a row, and the options of all rows of a job."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +31,7 @@ class RowKeys(OnRobot):
 
 @dataclass(frozen=True, kw_only=True)
 class Batch(Finish, OnRobot):
-    """What is said of all rows."""
+    """Options of all rows."""
 
     seconds: float = like(Generate, "seconds", "length of rows that do not say", default=5.0)
     seed: int = like(Sampling, "seed", "seed of rows that do not say, of the first variant")

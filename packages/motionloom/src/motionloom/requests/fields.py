@@ -109,8 +109,8 @@ class Spec:
         return value
 
 
-def _wrong(place: str, wanted: str, value: Any) -> NoReturn:
-    raise MotionloomError(f"{place} {wanted}; got {kind_of(value)}")
+def _wrong(place: str, demand: str, value: Any) -> NoReturn:
+    raise MotionloomError(f"{place} {demand}; got {kind_of(value)}")
 
 
 class Bounds(TypedDict, total=False):
@@ -155,15 +155,15 @@ def group(usual: Any, *names: str) -> Any:
 @cache
 def specs(request: type) -> Mapping[str, Spec]:
     """The fields of a request by name, those of its groups among them."""
-    found: dict[str, Spec] = {}
+    result: dict[str, Spec] = {}
     own = request.__annotations__
     for one in sorted(fields(request), key=lambda one: one.name not in own):
         if spec := one.metadata.get("spec"):
-            found[one.name] = replace(spec, default=None if one.default is MISSING else one.default)
+            result[one.name] = replace(spec, default=None if one.default is MISSING else one.default)
         elif names := one.metadata.get("group"):
             known = specs(type(one.default))
-            found |= {name: replace(known[name], default=getattr(one.default, name)) for name in names}
-    return found
+            result |= {name: replace(known[name], default=getattr(one.default, name)) for name in names}
+    return result
 
 
 @cache

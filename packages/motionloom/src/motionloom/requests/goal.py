@@ -77,7 +77,7 @@ PATHS: Mapping[str, Keys] = {
         "facing": _FACING,
     },
 }
-"""The keys of a path by the one that says which it is."""
+"""The keys of a path by the one that decides which it is."""
 JOINT: Keys = {
     "joint": Spec("joint", "a joint of the 22, or a group of them", needed=True),
     "points": Spec("point", "places at times, rising, at least a frame apart", many=MAX_PLACES),

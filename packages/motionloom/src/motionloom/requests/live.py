@@ -37,7 +37,7 @@ class ScriptKeys(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class TimedKeys(Checked):
-    """The keys of a command beside what it asks."""
+    """The keys of a command beside its own."""
 
     at: float = declare("number", "when it is asked", needed=True, low=0, high=LONGEST_SCRIPT, unit="seconds")
     person: int | None = declare("whole", "whom of two, 1 or 2; without it everybody", low=1, high=2)
@@ -45,7 +45,7 @@ class TimedKeys(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class Live(Looping):
-    """How a scripted session is made."""
+    """The keys of a scripted session."""
 
     seed: int | None = like(Sampling, "seed", "the same seed makes the same motion: the script's, else 0", default=None)
     fps: float | None = declare("number", "frames per second that are shown: the model's 20", low=1, high=240)

@@ -99,8 +99,8 @@ class Sampling(Checked):
         for name in settings:
             if name not in known:
                 close = get_close_matches(name, known, n=1)
-                meant = f"did you mean {close[0]!r}?" if close else f"the settings are {', '.join(known)}"
-                raise TypeError(f"there is no setting {name!r}; {meant}")
+                hint = f"did you mean {close[0]!r}?" if close else f"the settings are {', '.join(known)}"
+                raise TypeError(f"there is no setting {name!r}; {hint}")
         if sampling is not None and type(sampling) is not cls:
             raise MotionloomError(f"this is sampled with a {cls.__name__}; got a {type(sampling).__name__}")
         return replace(sampling or cls(), **settings)
@@ -136,15 +136,15 @@ class Sampling(Checked):
         return [replace(self, count=1, first=self.first + number) for number in range(self.number())]
 
     def number(self, usual: int = 1) -> int:
-        """How many motions to make."""
+        """How many motions to generate."""
         return self.count or usual
 
     def numbers(self, usual: int = 1) -> range:
-        """The numbers of the motions to make."""
+        """The numbers of the motions to generate."""
         return range(self.first, self.first + self.number(usual))
 
     def alone(self) -> Self:
-        """The same where one motion is made, and no more; raises MotionloomError for a greater count."""
+        """The same for one motion, and no more; raises MotionloomError for a greater count."""
         if self.number() > 1:
             raise MotionloomError(f"one motion is made by a call of this; call it {self.count} times, with other seeds")
         return self
@@ -156,7 +156,7 @@ class Sampling(Checked):
 
 @dataclass(frozen=True)
 class PredictionSampling(Sampling):
-    """How futures are sampled (docs/decisions/0015): predictors take fewer steps and no guidance unless asked.
+    """How futures are sampled (docs/decisions/0015): predictors take fewer steps and no guidance by default.
 
     Few steps sample too little variety, and a person who goes on from its own calm comes to rest; so the noise at the
     start has a standard deviation above 1, the temperature.

@@ -10,8 +10,7 @@ LONGEST = 60.0
 LONGEST_PROMPT = 20_000
 """Characters."""
 SAMPLED = ("seed", "count", "guidance", "steps", "best_of")
-FINISH = ("foot_lock", "loop", "blend")
-"""Fields that most tasks have."""
+"""Fields of sampling that most tasks have."""
 
 
 def prompt(help: str = "what the person does, such as 'a person walks'", *, needed: bool = False) -> Any:

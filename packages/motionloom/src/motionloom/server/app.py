@@ -53,7 +53,7 @@ class Studio:
     """The project's JSON."""
     streams: Streams = field(init=False)
     files: asyncio.Semaphore = field(init=False)
-    """Held while a file is read or made: few at a time, and nobody else's answers wait for a thread."""
+    """Held while a file is read or written: few at a time, and nobody else's answers wait for a thread."""
 
     def __post_init__(self) -> None:
         self.saved = Saved(self.project)
@@ -93,7 +93,7 @@ def routes(*, page: bool = True) -> list[BaseRoute]:
         Route("/health", health),
         Route("/capabilities", capabilities),
         Route("/jobs", make_job, methods=["POST"]),
-        Route("/jobs/{id}", job, methods=["GET", "DELETE"]),
+        Route("/jobs/{id}", show_job, methods=["GET", "DELETE"]),
         Route("/jobs/{id}/events", job_events),
         Route("/motions", upload_motion, methods=["POST"]),
         Route("/motions/{name}", motion),
@@ -159,33 +159,33 @@ async def docs(request: Request) -> Response:
 async def make_job(request: Request) -> Response:
     studio = studio_of(request)
     body = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
-    asked = await run_in_threadpool(read_request, body, studio.project, studio.limits)
-    made = studio.worker.submit(asked, client_of(request))
-    return JSONResponse({"id": made.id}, status_code=202, headers={"Location": f"/jobs/{made.id}"})
+    order = await run_in_threadpool(read_request, body, studio.project, studio.limits)
+    job = studio.worker.submit(order, client_of(request))
+    return JSONResponse({"id": job.id}, status_code=202, headers={"Location": f"/jobs/{job.id}"})
 
 
 def client_of(request: Request) -> str:
-    """Who asks: the session that a page names in X-Client, else the address."""
+    """The client: the session that a page names in X-Client, else the address."""
     address = request.client.host if request.client else "unknown"
     named = request.headers.get("x-client", "")
     return f"{address} {named[:64]}" if named else address
 
 
-async def job(request: Request) -> Response:
+async def show_job(request: Request) -> Response:
     worker = studio_of(request).worker
-    found = worker.job(request.path_params["id"])
+    job = worker.job(request.path_params["id"])
     if request.method == "DELETE":
-        worker.cancel(found)
-    return JSONResponse(found.public())
+        worker.cancel(job)
+    return JSONResponse(job.public())
 
 
 async def job_events(request: Request) -> Response:
     studio = studio_of(request)
-    found = studio.worker.job(request.path_params["id"])
+    job = studio.worker.job(request.path_params["id"])
     last = request.headers.get("last-event-id") or request.query_params.get("after") or "0"
     if not (last.isascii() and last.isdecimal() and len(last) < 12):
         raise Refusal(400, "Last-Event-ID is the number of an event of this job")
-    return EventStream(found, int(last), studio.streams)
+    return EventStream(job, int(last), studio.streams)
 
 
 # Motions and characters
@@ -227,8 +227,8 @@ async def motion(request: Request) -> Response:
     if kind not in FORMATS:
         raise Refusal(404, f"motions are given as {', '.join(FORMATS)}; got {kind[:20]!r}")
     known = {key: value for key, value in request.query_params.items() if key in specs(Export)}
-    asked = read(Export, parse_fields(Export, known) | {"motion": name, "format": kind}, "a file")
-    part = await _with_file(studio, lambda: files.export(studio.project, asked))
+    options = read(Export, parse_fields(Export, known) | {"motion": name, "format": kind}, "a file")
+    part = await _with_file(studio, lambda: files.export(studio.project, options))
     return file_once(part, media_type=files.FORMATS[kind], name=f"motion-{name[:8]}{part.suffix}")
 
 
@@ -236,9 +236,9 @@ async def deeds(request: Request) -> Response:
     from motionloom.server import files
 
     stored = await run_in_threadpool(studio_of(request).project.motion, request.path_params["id"])
-    asked = request.query_params
-    found = await run_in_threadpool(files.deeds_between, stored, asked.get("begin"), asked.get("end"))
-    return JSONResponse({"happened": found})
+    query = request.query_params
+    report = await run_in_threadpool(files.deeds_between, stored, query.get("begin"), query.get("end"))
+    return JSONResponse({"happened": report})
 
 
 async def upload_character(request: Request) -> Response:
@@ -257,7 +257,7 @@ async def character(request: Request) -> Response:
 
 
 async def _with_file(studio: Studio, call: Callable[[], Any], part: Path | None = None, name: str = "") -> Any:
-    """Read or make a file in a thread, few at a time; ``part`` is called ``name`` in what goes wrong."""
+    """Read or write a file in a thread, few at a time; ``part`` is called ``name`` in what goes wrong."""
     async with studio.files:
         try:
             return await run_in_threadpool(call)

@@ -1,6 +1,6 @@
-"""MCP over standard input and output, so that an assistant can make motion: a tool for each task, and one for files.
+"""MCP over standard input and output, so that an assistant generates motion: a tool for each task, and one for files.
 
-What the tools take is what the requests say (`motionloom.requests`).
+The tools take the fields of the requests (`motionloom.requests`).
 Needs the extra ``mcp``. Nothing but the protocol may be written to standard output.
 """
 
@@ -74,10 +74,10 @@ class Assistant:
         self.project, self.worker = project, worker
 
     def tool(self, task: str) -> Callable[..., Any]:
-        """What makes motion of a task's request, with its fields as arguments."""
+        """A function that generates motion by a task's request, with its fields as arguments."""
 
-        async def call(**given: Any) -> Any:
-            return await self._results({"task": task} | given)
+        async def call(**fields: Any) -> Any:
+            return await self._results({"task": task} | fields)
 
         known = narrow_fields(REQUESTS[task], most(task, self.worker.limits))
         call.__name__ = "generate_motion" if task == "generate" else task
@@ -90,33 +90,33 @@ class Assistant:
         """What writes a motion to a file, with the fields of `Export` as arguments."""
         import anyio
 
-        async def export(**given: Any) -> Any:
-            return await _or_refusal(anyio.to_thread.run_sync(self._written, given))
+        async def export(**fields: Any) -> Any:
+            return await _or_refusal(anyio.to_thread.run_sync(self._write_file, fields))
 
         export.__doc__ = f"{inspect.getdoc(Export)} A motion is an id that another tool gave."
         export.__signature__ = _signature(specs(Export), dict[str, Any])  # type: ignore[attr-defined]
         return export
 
-    def _written(self, given: Mapping[str, Any]) -> dict[str, Any]:
+    def _write_file(self, fields: Mapping[str, Any]) -> dict[str, Any]:
         from motionloom.server import files
 
-        asked = read(Export, given, "export")
-        stem = asked.name or asked.motion
+        options = read(Export, fields, "export")
+        stem = options.name or options.motion
         if not isinstance(stem, str) or not _NAME.fullmatch(stem):
             raise MotionloomError(f"a file's name has letters, digits, - and _ only; got {str(stem)[:40]!r}")
-        part = files.export(self.project, asked)
-        place = self.project.folder / "exports" / f"{stem}.{asked.format}"
+        part = files.export(self.project, options)
+        place = self.project.folder / "exports" / f"{stem}.{options.format}"
         place.parent.mkdir(exist_ok=True)
         os.replace(part, place)
         return {"file": str(place), "bytes": place.stat().st_size}
 
     async def actions(self) -> str:
-        """What the prior has learned: seconds of recordings for each action, and sentences that tell of them."""
+        """What the prior has learned: seconds of recordings for each action, and sentences for them."""
         import anyio
 
         known = (await anyio.to_thread.run_sync(self.worker.prior)).known
-        found = {} if known is None else {"seconds": dict(known.seconds), "sentences": list(known.sentences)}
-        return json.dumps(found, ensure_ascii=False)
+        summary = {} if known is None else {"seconds": dict(known.seconds), "sentences": list(known.sentences)}
+        return json.dumps(summary, ensure_ascii=False)
 
     def goal_schema(self) -> str:
         """The JSON Schema of goals."""
@@ -124,25 +124,25 @@ class Assistant:
 
         return SCHEMAS["goal"]()
 
-    async def _results(self, asked: dict[str, Any]) -> Any:
+    async def _results(self, fields: dict[str, Any]) -> Any:
         """The results of a job, as values, as text, and as a picture."""
         import anyio
 
         def draw() -> tuple[list[dict[str, Any]], bytes]:
-            request = read_request(asked | {"levels": False}, self.project, self.worker.limits)
+            request = read_request(fields | {"levels": False}, self.project, self.worker.limits)
             job = self.worker.submit(request, CLIENT)
             job.wait()
             if job.state != "done":
                 raise MotionloomError(job.error or "the job was cancelled")
-            found = job.public()
-            results = [one | {"remarks": [*found["remarks"], *one["remarks"]]} for one in found["results"]]
+            report = job.public()
+            results = [one | {"remarks": [*report["remarks"], *one["remarks"]]} for one in report["results"]]
             return results, self._picture(results)
 
         results, picture = await _or_refusal(anyio.to_thread.run_sync(draw))
         types = import_module("mcp.types")
-        told = [types.TextContent(type="text", text=json.dumps(one, ensure_ascii=False)) for one in results]
+        texts = [types.TextContent(type="text", text=json.dumps(one, ensure_ascii=False)) for one in results]
         image = types.ImageContent(type="image", data=base64.b64encode(picture).decode(), mime_type="image/png")
-        return types.CallToolResult(content=[*told, image], structured_content={"result": results})
+        return types.CallToolResult(content=[*texts, image], structured_content={"result": results})
 
     def _picture(self, results: Sequence[Mapping[str, Any]]) -> bytes:
         """A PNG with a row for every person of the motions."""

@@ -40,12 +40,14 @@ async def file_of(
     Of the name only the ending, one of ``suffixes``, says where the file is. It is gone behind the block unless it was
     moved away.
     """
-    said = request.query_params.get("name", "")
-    name = PurePosixPath(PureWindowsPath(said).name).name[:200]
+    client_path = request.query_params.get("name", "")
+    name = PurePosixPath(PureWindowsPath(client_path).name).name[:200]
     suffix = PurePosixPath(name).suffix.lower()
     if suffix not in suffixes:
         raise Refusal(
-            400, f"say the file's name with ?name=, ending in {', '.join(suffixes)}; got {shown(said)}", headers=CLOSE
+            400,
+            f"say the file's name with ?name=, ending in {', '.join(suffixes)}; got {shown(client_path)}",
+            headers=CLOSE,
         )
     part = project.part(suffix)
     try:
@@ -58,9 +60,9 @@ async def file_of(
 
 
 async def _pieces(request: Request, most: int, seconds: float) -> AsyncIterator[bytes]:
-    said = request.headers.get("content-length", "0")
-    if said.isdecimal() and len(said) < 20 and int(said) > most:
-        raise _too_large(int(said), most)
+    length = request.headers.get("content-length", "0")
+    if length.isdecimal() and len(length) < 20 and int(length) > most:
+        raise _too_large(int(length), most)
     count = 0
     stream = request.stream()
     deadline = asyncio.get_running_loop().time() + seconds

@@ -1,4 +1,4 @@
-"""Characters of the project: read as they arrive, with joints that somebody names where their own names say nothing."""
+"""Characters of the project: read as they arrive, with joints that the user names where their own names are unknown."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,36 +23,36 @@ Named = Mapping[str, str]
 """Of the 22 joints by name the character's joints, as far as somebody named them."""
 
 
-def read_character(project: Project, part: Path, name: str, said: str | None = None) -> dict[str, Any]:
+def read_character(project: Project, part: Path, name: str, joints_json: str | None = None) -> dict[str, Any]:
     """A character's file that arrived as ``part``, into the project: its id and which of its joints are which.
 
-    said: JSON of the joints that somebody named. Raises `Refusal` 400 with the skeleton's ``joints`` and ``guesses``
+    joints_json: the joints that somebody named. Raises `Refusal` 400 with the skeleton's ``joints`` and ``guesses``
     where the 22 joints are not found on it, and `MotionloomError` for a file that holds none.
     """
     suffix = part.suffix
     if suffix not in SUFFIXES:
         raise MotionloomError(f"{name} is no character: its name must end in {', '.join(SUFFIXES)}")
-    named = named_joints(said)
+    named = named_joints(joints_json)
     try:
         skeleton, character = loaded(part, named)
         joints = joint_map(skeleton) if character is None else character.joints
     except MotionloomError as error:
         sentence = str(error).replace(str(part), name)
         try:
-            asked = question(_skeleton(part))
+            details = question(_skeleton(part))
         except MotionloomError:
             raise error from None
-        raise Refusal(400, sentence, more=asked) from None
-    found = {joint: list(points) for joint, points in joints.names().items()}
-    return {"id": project.add_character(part, name, suffix, named), "name": name, "joints": found}
+        raise Refusal(400, sentence, more=details) from None
+    matches = {joint: list(names) for joint, names in joints.names().items()}
+    return {"id": project.add_character(part, name, suffix, named), "name": name, "joints": matches}
 
 
-def named_joints(said: str | None) -> dict[str, str]:
+def named_joints(text: str | None) -> dict[str, str]:
     """The joints that somebody named, out of JSON; raises `MotionloomError` for what is no such mapping."""
-    found = {} if not said else parse_json(said.encode(), "the character's joints")
-    if not isinstance(found, dict) or not all(isinstance(one, str) for one in found.values()):
+    names = {} if not text else parse_json(text.encode(), "the character's joints")
+    if not isinstance(names, dict) or not all(isinstance(one, str) for one in names.values()):
         raise MotionloomError('the character\'s \'joints\' are an object such as {"left_knee": "Shin_L"}')
-    return found
+    return names
 
 
 def loaded(path: Path, named: Named) -> tuple[Skeleton, Character | None]:

@@ -39,7 +39,7 @@ def draw(models: Models, request: JobRequest, progress: Progress) -> Iterator[Re
 
 
 def plan_of(request: JobRequest) -> Plan:
-    """What is asked, with the motions that it names."""
+    """The plan of a request, with the motions that it names."""
     timeline, values = request.timeline, request.values
     goals = (request.goal, request.other_goal)
     if request.task == "duet" and values.person == 1:
@@ -70,7 +70,7 @@ def plan_of(request: JobRequest) -> Plan:
         people=tuple(people),
         target=target,
         taught=request.taught,
-        previous=request.kept,
+        previous=request.previous,
     )
 
 
@@ -94,7 +94,7 @@ def remarks_of(models: Models, request: JobRequest) -> list[Remark]:
 
 
 def batch_key(request: JobRequest) -> tuple[Any, ...] | None:
-    """Requests of one key may be drawn in one network call; None: this one is drawn alone."""
+    """Requests of one key may be sampled in one network call; None: this one is sampled alone."""
     if request.task != "generate" or request.call is not None or request.timeline is not None:
         return None
     alike = replace(request.sampling, seed=0, count=1)
@@ -104,7 +104,7 @@ def batch_key(request: JobRequest) -> tuple[Any, ...] | None:
 
 
 def at_once(request: JobRequest) -> bool:
-    """Whether the motions of a request are drawn in the same network calls, rather than one after the other."""
+    """Whether the motions of a request are sampled in the same network calls, rather than one after the other."""
     return request.call is None and tasks.is_batched(request)
 
 
@@ -126,20 +126,20 @@ def cropped(motion: Motion, values: Any) -> Motion:
 
 def measured(motion: Motion, parts: Iterable[tuple[str, Goal]]) -> dict[str, Any]:
     """How far a motion is from each part of its goal: mean and worst in centimetres, and when it is worst."""
-    positions, found = None, {}
+    positions, distances = None, {}
     for name, goal in parts:
-        asked = goal.mask.any(axis=-1)
-        if not asked.any() or len(goal) != len(motion):
+        mask = goal.mask.any(axis=-1)
+        if not mask.any() or len(goal) != len(motion):
             continue
         positions = motion.positions() if positions is None else positions
         away = np.linalg.norm(np.where(goal.mask, positions - goal.positions, 0.0), axis=-1)
         worst = int(away.max(axis=1).argmax())
-        found[name] = {
-            "mean_cm": round(100 * float(away[asked].mean()), 2),
+        distances[name] = {
+            "mean_cm": round(100 * float(away[mask].mean()), 2),
             "worst_cm": round(100 * float(away.max()), 2),
             "worst_at": round(worst / motion.fps, 3),
         }
-    return {"goals": found} if found else {}
+    return {"goals": distances} if distances else {}
 
 
 def placed(request: JobRequest, poses: Array) -> Array:

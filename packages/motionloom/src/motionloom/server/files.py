@@ -65,8 +65,8 @@ def places(stored: Stored, *, seeing: bool = False) -> bytes:
     seeing: behind them the directions in which the heads look, (people, frames, 3) of length 1.
     """
     people = [_uniform(person) for person in stored.people]
-    found = [person.positions() for person in people] + [looks(person) for person in people if seeing]
-    return b"".join(map(float32, found))
+    arrays = [person.positions() for person in people] + [looks(person) for person in people if seeing]
+    return b"".join(map(float32, arrays))
 
 
 def deeds_between(stored: Stored, begin: str | None, end: str | None) -> list[dict[str, Any] | None]:
@@ -87,81 +87,81 @@ def _uniform(person: Motion) -> Motion:
 
 def from_json(part: Path, name: str) -> list[Motion]:
     """Motions of the 22-joint person as `as_json` gives them: ``fps``, ``people``, their ``root`` and ``rotations``."""
-    found = Field(parse_json(part.read_bytes(), name), name)
-    given = found.mapping(("fps", "people", "id", "frames", "seconds", "about"), ("fps", "people"))
-    fps = given["fps"].number(1.0, 240.0)
-    return [_person(one, fps) for one in given["people"].items(most=8)]
+    document = Field(parse_json(part.read_bytes(), name), name)
+    fields = document.mapping(("fps", "people", "id", "frames", "seconds", "about"), ("fps", "people"))
+    fps = fields["fps"].number(1.0, 240.0)
+    return [_person(one, fps) for one in fields["people"].items(most=8)]
 
 
-def _person(found: Field, fps: float) -> Motion:
-    given = found.mapping(("root", "rotations", "positions", "looks"), ("root", "rotations"))
-    root, rotations = _decoded(given["root"], 3), _decoded(given["rotations"], 4 * len(SMPL22))
+def _person(field: Field, fps: float) -> Motion:
+    fields = field.mapping(("root", "rotations", "positions", "looks"), ("root", "rotations"))
+    root, rotations = _decoded(fields["root"], 3), _decoded(fields["rotations"], 4 * len(SMPL22))
     lengths = np.linalg.norm(rotations.reshape(len(rotations), -1, 4), axis=-1, keepdims=True)
     if len(root) != len(rotations):
-        found.fail(f"has {len(root)} places of the root and rotations for {len(rotations)} frames; make them as many")
+        field.fail(f"has {len(root)} places of the root and rotations for {len(rotations)} frames; make them as many")
     if not (np.abs(lengths - 1) < 0.01).all():
-        given["rotations"].fail("must be quaternions (w, x, y, z) of length 1")
+        fields["rotations"].fail("must be quaternions (w, x, y, z) of length 1")
     return Motion(SMPL22, fps, root, rotations.reshape(len(rotations), -1, 4) / lengths)
 
 
-def _decoded(found: Field, width: int) -> np.ndarray:
+def _decoded(field: Field, width: int) -> np.ndarray:
     """(frames, width) numbers out of base64 of little-endian float32."""
     try:
-        data = base64.b64decode(found.value, validate=True)
+        data = base64.b64decode(field.value, validate=True)
     except (TypeError, ValueError):
         data = b""
     if not data or len(data) % (4 * width):
-        found.wrong(f"base64 of float32 in little-endian order, {width} for each frame")
+        field.wrong(f"base64 of float32 in little-endian order, {width} for each frame")
     values = np.frombuffer(data, "<f4").astype(np.float64).reshape(-1, width)
     if not (np.isfinite(values).all() and np.abs(values).max() < 1e5):
-        found.fail("holds what is no place or rotation")
+        field.fail("holds what is no place or rotation")
     return values
 
 
-def export(project: Project, asked: Export) -> Path:
-    """A file of a motion in the project's temporary folder; whoever asks for it removes it.
+def export(project: Project, options: Export) -> Path:
+    """A file of a motion in the project's temporary folder; the caller removes it.
 
-    asked: the motion and a character by their ids; a character plays an html. Without a root all joints above the hips
-    go along. Raises `Refusal` and `MotionloomError` for what cannot be.
+    options: the motion and a character by their ids; a character plays an html. Without a root all joints above the
+    hips go along. Raises `Refusal` and `MotionloomError` for what cannot be.
     """
-    skeleton, person = asked.skeleton, asked.person
+    skeleton, person = options.skeleton, options.person
     for name in ("root", "hands", "at"):
-        if getattr(asked, name) is not None and skeleton is None:
+        if getattr(options, name) is not None and skeleton is None:
             raise Refusal(400, f"'{name}' goes with a 'skeleton'; name one")
-    stored = project.motion(asked.motion)
-    people = [_stretch(one, asked) for one in stored.people]
+    stored = project.motion(options.motion)
+    people = [_stretch(one, options) for one in stored.people]
     if person is not None and person >= len(people):
         raise Refusal(400, f"the motion has {len(people)} people, counted from 0; there is no person {person}")
-    if person is not None or asked.format in ONE_PERSON:
+    if person is not None or options.format in ONE_PERSON:
         people = [people[person or 0]]
     caption = str(stored.about.get("prompt") or stored.about.get("name") or "")
     if skeleton is not None and skeleton not in NAMED:
-        return _on_character(project, people, skeleton, caption, asked)
+        return _on_character(project, people, skeleton, caption, options)
     if skeleton is not None:
-        people = [_put(one, named_skeleton(skeleton), asked) for one in people]
-    part = project.part(f".{asked.format}")
+        people = [_retarget(one, named_skeleton(skeleton), options) for one in people]
+    part = project.part(f".{options.format}")
     if len(people) > 1:
         return save_scene(people, part, names=_names(people), captions=[caption] * len(people))
     return save(people[0], part, captions=[caption])
 
 
-def _stretch(motion: Motion, asked: Export) -> Motion:
-    """The part that is asked, at the rate that is."""
+def _stretch(motion: Motion, options: Export) -> Motion:
+    """The part of a motion that the options name, at their rate."""
     from motionloom.server.drawing import cropped  # the page is there before the sampler
 
-    motion = cropped(motion, asked)
-    motion = motion.mirror() if asked.mirror else motion
-    return motion if asked.fps is None else motion.resample(asked.fps)
+    motion = cropped(motion, options)
+    motion = motion.mirror() if options.mirror else motion
+    return motion if options.fps is None else motion.resample(options.fps)
 
 
-def _put(motion: Motion, skeleton: Skeleton, asked: Export) -> Motion:
-    moved = retarget(motion, skeleton, root=cast("RootMode | None", asked.root))
-    return pose_hands(moved, cast("HandPose", asked.hands or "as-is"))
+def _retarget(motion: Motion, skeleton: Skeleton, options: Export) -> Motion:
+    moved = retarget(motion, skeleton, root=cast("RootMode | None", options.root))
+    return pose_hands(moved, cast("HandPose", options.hands or "as-is"))
 
 
-def _on_character(project: Project, people: Sequence[Motion], skeleton: str, caption: str, asked: Export) -> Path:
+def _on_character(project: Project, people: Sequence[Motion], skeleton: str, caption: str, options: Export) -> Path:
     path, _ = project.character(skeleton)
-    kind = asked.format
+    kind = options.format
     suffix = path.suffix
     if suffix == ".asf":
         raise MotionloomError("an ASF skeleton belongs to AMC files; put motions on a .glb, .vrm, .gltf or .bvh")
@@ -169,8 +169,8 @@ def _on_character(project: Project, people: Sequence[Motion], skeleton: str, cap
     if character is not None and kind == "glb" and len(people) > 1:
         raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
     body = read_body(target)
-    moved = [bend_toes(_put(one, target, asked), body) for one in people]
-    if character is not None and character.stand != HERE and len(moved) == 1 and asked.at != "origin":
+    moved = [bend_toes(_retarget(one, target, options), body) for one in people]
+    if character is not None and character.stand != HERE and len(moved) == 1 and options.at != "origin":
         moved = [started(moved[0], body, character.stand)]
     if character is not None and kind == "glb":
         return character.save(moved[0], project.part(suffix), name=caption[:80] or None)

@@ -42,8 +42,8 @@ _ROOM = asyncio.Semaphore(MOST)
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What a client says first."""
+class Film:
+    """What a client sends first."""
 
     format: str
     size: tuple[int, int]
@@ -79,13 +79,13 @@ async def film(websocket: WebSocket) -> None:
         try:
             async with asyncio.timeout(studio.limits.body_seconds):
                 message = await _received(websocket)
-            asked = read(message.get("text") or "", studio.limits.total_seconds)
-            part = studio.project.part(f".{asked.format}")
+            description = read(message.get("text") or "", studio.limits.total_seconds)
+            part = studio.project.part(f".{description.format}")
             try:
                 if _ROOM.locked():
                     raise MotionloomError(f"{MOST} films are being written already; wait until one of them is done")
                 async with _ROOM:
-                    await asyncio.to_thread(_write, _Pictures(websocket, asked, studio.limits.body_seconds), part)
+                    await asyncio.to_thread(_write, _Pictures(websocket, description, studio.limits.body_seconds), part)
                 await _send(websocket, part)
             finally:
                 part.unlink(missing_ok=True)
@@ -95,15 +95,15 @@ async def film(websocket: WebSocket) -> None:
             await websocket.close(REFUSED)
 
 
-def read(text: str, seconds: float) -> Asked:
-    """What a client wants, of at most ``seconds``; raises `MotionloomError` for what is no film."""
+def read(text: str, seconds: float) -> Film:
+    """The film that a client sends, of at most ``seconds``; raises `MotionloomError` for what is no film."""
     from motionloom.viz.film import MAX_GIF_FRAMES, film_size
 
     keys = ("format", "width", "height", "fps", "count")
-    given = Field(parse_json(text.encode(), "the film"), "the film").mapping(keys, keys)
-    kind = given["format"].word(("mp4", "gif"))
-    width, height, count = (_whole(given[name]) for name in ("width", "height", "count"))
-    fps = given["fps"].number(1.0, MAX_FPS)
+    parts = Field(parse_json(text.encode(), "the film"), "the film").mapping(keys, keys)
+    kind = parts["format"].word(("mp4", "gif"))
+    width, height, count = (_whole(parts[name]) for name in ("width", "height", "count"))
+    fps = parts["fps"].number(1.0, MAX_FPS)
     if film_size((width, height)) != (width, height):
         raise MotionloomError(f"a film has even numbers of pixels; got {width}x{height}")
     if count > seconds * fps + 1:
@@ -112,7 +112,7 @@ def read(text: str, seconds: float) -> Asked:
         raise MotionloomError(
             f"a GIF of {count} pictures of {width}x{height} is too large; choose a smaller size or MP4"
         )
-    return Asked(kind, (width, height), fps, count)
+    return Film(kind, (width, height), fps, count)
 
 
 def _whole(field: Field) -> int:
@@ -123,16 +123,16 @@ def _whole(field: Field) -> int:
 
 
 class _Pictures:
-    """The pictures of a client, as the thread of the encoder asks for them."""
+    """The pictures of a client, as the thread of the encoder takes them."""
 
-    def __init__(self, websocket: WebSocket, asked: Asked, seconds: float) -> None:
-        self.asked = asked
+    def __init__(self, websocket: WebSocket, film: Film, seconds: float) -> None:
+        self.film = film
         self._websocket, self._seconds = websocket, seconds
         self._loop = asyncio.get_running_loop()
         self._rest = bytearray()
 
     def __iter__(self) -> Iterator[bytes]:
-        for number in range(self.asked.count):
+        for number in range(self.film.count):
             coming = asyncio.run_coroutine_threadsafe(self._next(number), self._loop)
             yield coming.result(2 * self._seconds)
 
@@ -148,37 +148,37 @@ class _Pictures:
     async def _bytes(self, count: int) -> bytes:
         while len(self._rest) < count:
             self._rest += (await _received(self._websocket)).get("bytes") or b""
-        taken = bytes(self._rest[:count])
+        data = bytes(self._rest[:count])
         del self._rest[:count]
-        return taken
+        return data
 
 
 def _write(pictures: _Pictures, part: Path) -> None:
     from motionloom.viz.film import write_film
 
-    asked = pictures.asked
+    film = pictures.film
     with TemporaryFile(dir=part.parent) as file:
-        frames = _on_disk(pictures, file) if asked.format == "gif" else lambda _: map(asked.decoded, pictures)
-        write_film(frames, part, asked.size, rate=asked.fps, count=asked.count)
+        frames = _on_disk(pictures, file) if film.format == "gif" else lambda _: map(film.decoded, pictures)
+        write_film(frames, part, film.size, rate=film.fps, count=film.count)
 
 
 def _on_disk(pictures: _Pictures, file: IO[bytes]) -> "Callable[[Sequence[int]], Iterator[Image.Image]]":
-    """Pictures that can be seen again: a GIF's palette is of pictures from all over it."""
+    """Pictures that can be read again: a GIF's palette is of pictures from all over it."""
     ends = [0]
     for data in pictures:
-        pictures.asked.decoded(data)
+        pictures.film.decoded(data)
         if ends[-1] + len(data) > MAX_GIF_BYTES:
             raise MotionloomError(
                 f"the pictures of a GIF are over {MAX_GIF_BYTES >> 20} MB; choose a smaller size or MP4"
             )
         ends.append(ends[-1] + file.write(data))
 
-    def seen(numbers: Sequence[int]) -> "Iterator[Image.Image]":
+    def pictures_at(numbers: Sequence[int]) -> "Iterator[Image.Image]":
         for number in numbers:
             file.seek(ends[number])
-            yield pictures.asked.decoded(file.read(ends[number + 1] - ends[number]))
+            yield pictures.film.decoded(file.read(ends[number + 1] - ends[number]))
 
-    return seen
+    return pictures_at
 
 
 async def _send(websocket: WebSocket, part: Path) -> None:

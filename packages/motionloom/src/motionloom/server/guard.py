@@ -1,4 +1,4 @@
-"""Who may ask: the Host and Origin of a request, and the token. ASGI middleware in front of everything.
+"""Which requests are answered: by their Host and Origin, and the token. ASGI middleware in front of everything.
 
 A page of another site can make a browser send requests to 127.0.0.1, and with a name that it lets point there (DNS
 rebinding) even read the answers. So a server on the loopback answers to names of the loopback only, and no request that
@@ -22,7 +22,7 @@ OPEN = ("/health",)
 
 @dataclass(frozen=True)
 class Door:
-    """What is asked of a request."""
+    """What a request must have."""
 
     loopback: bool
     """The server is bound to the loopback."""
@@ -30,7 +30,7 @@ class Door:
     hosts: tuple[str, ...] = ()
     """Further names that the server has."""
     origins: tuple[str, ...] = ()
-    """Further origins whose pages may ask, such as a development server's ``http://localhost:5173``."""
+    """Further origins whose pages are answered, such as a development server's ``http://localhost:5173``."""
     page: frozenset[str] = frozenset()
     """Paths of the page's files, which anybody may read."""
 
@@ -69,10 +69,10 @@ class Door:
         """Whether a request comes with the token; where there is none, everybody has it."""
         if self.token is None:
             return True
-        given = _headers(scope).get("authorization", "").removeprefix("Bearer ").strip()
-        if not given:
-            given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
-        return hmac.compare_digest(given.encode(), self.token.encode())
+        token = _headers(scope).get("authorization", "").removeprefix("Bearer ").strip()
+        if not token:
+            token = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
+        return hmac.compare_digest(token.encode(), self.token.encode())
 
 
 def _headers(scope: dict[str, Any]) -> dict[str, str]:
@@ -116,7 +116,7 @@ class Guard:
 
 
 def _in_envelope(path: str, status: int, sentence: str) -> Any:
-    """The sentence, or MMCP's envelope of it where MMCP was asked."""
+    """The sentence, or MMCP's envelope of it where the request is one of MMCP."""
     if path != "/generate" and not path.startswith("/mmcp"):
         return sentence
     code = {401: "unauthorized", 503: "resource_exhausted"}.get(status, "forbidden")

@@ -1,4 +1,4 @@
-"""Jobs: what was asked, how far it is, what came of it, and the log that event streams are read from.
+"""Jobs: the request, how far it is, what came of it, and the log that event streams are read from.
 
 A `Job` is written by the worker's thread and read by the server's; what changes lies behind its lock. An event is
 written out once, by the thread in which it happens, and every stream sends the same bytes. Nobody waits for readers: a
@@ -50,13 +50,13 @@ class Job:
     """Of levels in the log."""
     id: str = field(default_factory=lambda: secrets.token_hex(8))
     state: str = "queued"
-    done: int = 0
+    calls: int = 0
     of: int = 0
     status: int | None = None
     """The HTTP status that an error of a request has for the same reason, such as 507 for a full disk."""
     error: str | None = None
     remarks: list[Remark] = field(default_factory=list)
-    """What is to be said of its words."""
+    """Remarks on its words."""
     results: list[dict[str, Any]] = field(default_factory=list)
     log_bytes: int = 0
     _number: int = 0
@@ -74,7 +74,7 @@ class Job:
     def public(self) -> dict[str, Any]:
         """The job as clients see it."""
         with self._lock:
-            share = 1.0 if self.state == "done" else self.done / self.of if self.of else 0.0
+            share = 1.0 if self.state == "done" else self.calls / max(self.of, 1)
             return {
                 "id": self.id,
                 "task": self.request.task,
@@ -97,11 +97,11 @@ class Job:
             self.state = "running"
             return True
 
-    def progress(self, done: int, of: int) -> None:
-        """So many network calls of so many are made."""
+    def progress(self, calls: int, of: int) -> None:
+        """So many network calls of so many are finished."""
         with self._lock:
-            self.done, self.of = done, of
-            self._progress = self._event("progress", json.dumps({"done": done, "of": of}))
+            self.calls, self.of = calls, of
+            self._progress = self._event("progress", json.dumps({"done": calls, "of": of}))
         self._tell()
 
     def level(self, level: int, of: int, row: int, poses: np.ndarray, begin: float = 0.0) -> None:
@@ -141,8 +141,8 @@ class Job:
         with self._lock:
             at = bisect_right(self._levels, number, key=lambda event: event.number)
             level = self._levels[at] if at < len(self._levels) else None
-            found = (event for event in (level, self._progress, self._final) if event and event.number > number)
-            return min(found, key=lambda event: event.number, default=None)
+            candidates = (event for event in (level, self._progress, self._final) if event and event.number > number)
+            return min(candidates, key=lambda event: event.number, default=None)
 
     @contextmanager
     def listening(self, listener: Callable[[], None]) -> Iterator[None]:
@@ -200,7 +200,7 @@ class Job:
 
 
 BEAT = 15.0
-"""Seconds after which a silent stream says that it is still there."""
+"""Seconds after which a silent stream sends a sign of life."""
 
 
 class Streams:

@@ -62,7 +62,7 @@ class Limits(PublicLimits):
     stuck_seconds: float = 60.0
     """After which a client that takes nothing of its answer is gone."""
     exports: int = 2
-    """Files that are made at the same time."""
+    """Files that are written at the same time."""
 
     def public(self) -> dict[str, float]:
         """What `/capabilities` reports."""

@@ -56,15 +56,15 @@ def fixed_document() -> dict[str, Any]:
 
 @cache
 def _fixed() -> dict[str, Any]:
-    found = yaml.safe_load((resources.files("motionloom.server") / "openapi.yaml").read_text(encoding="utf-8"))
-    found.pop("x-error")  # a part that others refer to
-    return found
+    outline = yaml.safe_load((resources.files("motionloom.server") / "openapi.yaml").read_text(encoding="utf-8"))
+    outline.pop("x-error")  # a part that others refer to
+    return outline
 
 
 def _object(properties: dict[str, Schema], *required: str, more: bool = True, about: str = "") -> Schema:
     """An object; ``more``: it may have other keys too."""
-    found: Schema = {"type": "object", "properties": properties, "additionalProperties": more}
-    return found | {"required": list(required)} | ({"description": about} if about else {})
+    base: Schema = {"type": "object", "properties": properties, "additionalProperties": more}
+    return base | {"required": list(required)} | ({"description": about} if about else {})
 
 
 def request_of(task: str) -> str:
@@ -74,29 +74,29 @@ def request_of(task: str) -> str:
 
 def components(limits: Limits) -> dict[str, Schema]:
     """Name to schema, of a server with these limits."""
-    found = fixed_document()["components"]["schemas"]
+    schemas = fixed_document()["components"]["schemas"]
     for name, words in (("Task", TASKS), ("JobState", ("queued", "running", *FINAL)), ("MotionFormat", FORMATS)):
-        found[name]["enum"] = list(words)
-    return _requests(limits) | _timelines() | found
+        schemas[name]["enum"] = list(words)
+    return _requests(limits) | _timelines() | schemas
 
 
 def _requests(limits: Limits) -> dict[str, Schema]:
     """Of every task, and of the words that fields of them may be, which are named after these fields."""
-    found: dict[str, Schema] = {}
+    schemas: dict[str, Schema] = {}
     for request in (*REQUESTS.values(), OnSkeleton):
-        found |= {name.title(): {"enum": list(spec.words)} for name, spec in specs(request).items() if spec.words}
+        schemas |= {name.title(): {"enum": list(spec.words)} for name, spec in specs(request).items() if spec.words}
     for task, request in REQUESTS.items():
         fields = narrow_fields(request, most(task, limits))
         keys = {"task": {"const": task}, "levels": _levels(limits)}
         keys |= {name: ref(name.title()) if spec.words else schema(spec, KINDS) for name, spec in fields.items()}
         needed = [name for name, spec in fields.items() if spec.needed]
-        found[request_of(task)] = _object(keys, "task", *needed, more=False)
+        schemas[request_of(task)] = _object(keys, "task", *needed, more=False)
     mapping = {task: ref(request_of(task))["$ref"] for task in TASKS}
     one = {
         "oneOf": [ref(request_of(task)) for task in TASKS],
         "discriminator": {"propertyName": "task", "mapping": mapping},
     }
-    return {"JobRequest": one, **found}
+    return {"JobRequest": one, **schemas}
 
 
 def _levels(limits: Limits) -> Schema:
@@ -116,29 +116,29 @@ def _timelines() -> dict[str, Schema]:
 
 def document(limits: Limits) -> dict[str, Any]:
     """The OpenAPI document of a server with these limits."""
-    found = fixed_document()
-    found["info"]["version"] = version("motionloom")
-    found["components"]["schemas"] = components(limits)
-    exported = found["paths"]["/motions/{id}.{format}"]["get"]["parameters"]
+    api = fixed_document()
+    api["info"]["version"] = version("motionloom")
+    api["components"]["schemas"] = components(limits)
+    exported = api["paths"]["/motions/{id}.{format}"]["get"]["parameters"]
     for name, spec in specs(Export).items():
         if name not in ("motion", "format", "name"):
             kind = ref(name.title()) if spec.words else schema(spec, {})
             about = {"name": name, "in": "query", "required": False, "description": spec.help, "schema": kind}
             exported.append(about)
-    return found
+    return api
 
 
-def as_page(found: dict[str, Any]) -> str:
+def as_page(api: dict[str, Any]) -> str:
     """The document as one page of HTML that needs nothing else."""
     rows = [
         f"<h2><code>{method.upper()} {html.escape(path)}</code></h2><p>{html.escape(about['summary'])}</p>"
         f"<details><summary>in detail</summary><pre>{html.escape(json.dumps(about, indent=1))}</pre></details>"
-        for path, methods in found["paths"].items()
+        for path, methods in api["paths"].items()
         for method, about in methods.items()
     ]
-    schemas = html.escape(json.dumps(found["components"]["schemas"], indent=1))
+    schemas = html.escape(json.dumps(api["components"]["schemas"], indent=1))
     return (
         f"<!doctype html><html lang=en><meta charset=utf-8><title>motionloom: the server</title><style>{STYLE}</style>"
-        f"<h1>motionloom {html.escape(found['info']['version'])}</h1><p>The same as JSON: "
+        f"<h1>motionloom {html.escape(api['info']['version'])}</h1><p>The same as JSON: "
         f"<a href=openapi.json>openapi.json</a></p>{''.join(rows)}<h2>Schemas</h2><pre>{schemas}</pre></html>"
     )

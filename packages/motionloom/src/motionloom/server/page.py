@@ -16,15 +16,15 @@ MISSING = (
 
 
 def files(folder: Path = FOLDER) -> dict[str, Path]:
-    """The page's files by the paths they are asked with; empty where it is not built."""
+    """The page's files by their paths in the address; empty where it is not built."""
     if not (folder / "index.html").is_file():
         return {}
-    found = {f"/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*") if path.is_file()}
-    return {"/": folder / "index.html", **found}
+    paths = {f"/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*") if path.is_file()}
+    return {"/": folder / "index.html", **paths}
 
 
 def routes() -> list[BaseRoute]:
-    """A route for each file, and one at / that says so where there is no page."""
+    """A route for each file, and one at / that explains it where there is no page."""
     known = files()
     return [Route(path, _file_response(place)) for path, place in known.items()] or [Route("/", _missing)]
 
@@ -32,10 +32,10 @@ def routes() -> list[BaseRoute]:
 def _file_response(place: Path):
     kind = mimetypes.guess_type(place.name)[0] or "application/octet-stream"
     # Only names with a hash of what is in them stay the same for ever.
-    kept = "max-age=31536000, immutable" if place.parent.name == "assets" else "no-cache"
+    caching = "max-age=31536000, immutable" if place.parent.name == "assets" else "no-cache"
 
     async def give(request: Request) -> Response:
-        return FileResponse(place, media_type=kind, headers={"Cache-Control": kept})
+        return FileResponse(place, media_type=kind, headers={"Cache-Control": caching})
 
     return give
 

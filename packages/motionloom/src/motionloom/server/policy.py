@@ -1,4 +1,4 @@
-"""Headers of every answer: what a page of this server may load, who may frame it, and that types are meant as said.
+"""Headers of every answer: what a page of this server may load, who may frame it, and that types are as declared.
 
 The studio's page needs its own files, workers, and the pictures and downloads it makes itself (``blob:``). Nothing else
 is loaded: a character that names a picture somewhere on the network does not make the browser ask for it.

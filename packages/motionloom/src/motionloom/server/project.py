@@ -8,10 +8,10 @@
     characters/ID.glb       a character (.glb, .gltf, .vrm, .bvh) or the skeleton of AMC files (.asf)
     characters/ID.json      its name, and its joints where somebody named them
     temporary/              files on their way in or out; emptied at the start
-    exports/                files that an assistant asked for
+    exports/                files for an assistant
     lock                    held by the one server that has the folder open
 
-Names are made here and are 16 hexadecimal digits: nothing that a client sends becomes part of a path.
+Names are generated here and are 16 hexadecimal digits: nothing that a client sends becomes part of a path.
 """
 
 import json
@@ -123,7 +123,6 @@ class Project:
 
     def add(self, people: Sequence[Motion], about: dict[str, Any]) -> Stored:
         """Keep a motion; the oldest ones that the project does not name make room for it."""
-
         stored = Stored(secrets.token_hex(8), tuple(people), about)
         about = {**about, "people": len(stored.people)}
         places = [self.motions / _file(stored.id, number) for number in range(len(stored.people))]
@@ -147,7 +146,6 @@ class Project:
 
     def motion(self, name: Any) -> Stored:
         """The motion of that id; raises `Refusal` 404 where there is none."""
-
         if not isinstance(name, str) or not ID.fullmatch(name):
             raise Refusal(404, "there is no such motion: an id is 16 hexadecimal digits, as the server gave it")
         with self._lock:
@@ -199,16 +197,16 @@ class Project:
         with self._lock:
             if sum(1 for _ in self.characters.glob("*.json")) >= self.limits.uploads:
                 raise Refusal(409, f"the project holds {self.limits.uploads} characters already; begin another project")
-            found = secrets.token_hex(8)
-            place = self.characters / f"{found}{suffix}"
+            identifier = secrets.token_hex(8)
+            place = self.characters / f"{identifier}{suffix}"
             os.replace(part, place)
             about = {"name": name, "suffix": suffix, **({"joints": dict(joints)} if joints else {})}
             try:
-                self._write(self.characters / f"{found}.json", json.dumps(about).encode())
+                self._write(self.characters / f"{identifier}.json", json.dumps(about).encode())
             except BaseException:
                 place.unlink(missing_ok=True)
                 raise
-        return found
+        return identifier
 
     def character(self, name: Any) -> tuple[Path, str]:
         """The file of that id and its name; raises `Refusal` 404 where there is none."""
@@ -222,8 +220,8 @@ class Project:
 
     def named_joints(self, name: str) -> dict[str, str]:
         """The joints of a character that somebody named, of the 22 by name."""
-        found = (_mapping(self.characters / f"{name}.json") or {}).get("joints", {})
-        return {str(part): str(joint) for part, joint in found.items()} if isinstance(found, dict) else {}
+        joints = (_mapping(self.characters / f"{name}.json") or {}).get("joints", {})
+        return {str(part): str(joint) for part, joint in joints.items()} if isinstance(joints, dict) else {}
 
     # -- the project's JSON
 
@@ -272,12 +270,12 @@ class Project:
 def _mapping(path: Path) -> dict[str, Any] | None:
     """The JSON object of a file, empty where it is damaged; None where there is no file."""
     try:
-        found = parse_json(path.read_bytes(), path.name)
+        value = parse_json(path.read_bytes(), path.name)
     except OSError:
         return None
     except MotionloomError:
         return {}
-    return found if isinstance(found, dict) else {}
+    return value if isinstance(value, dict) else {}
 
 
 def _file(name: str, number: int) -> str:

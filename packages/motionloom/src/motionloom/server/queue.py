@@ -12,7 +12,7 @@ AGAIN = {"Retry-After": "2"}
 
 
 class Queue:
-    """Jobs that wait. Each client's are drawn in their order; clients take turns."""
+    """Jobs that wait. Each client's are taken in their order; clients take turns."""
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
@@ -52,15 +52,15 @@ class Queue:
                 return []
             first = self._next(lambda job: True)
             assert first is not None
-            taken, left, common = [first], rows - first.request.count, key(first)
+            batch, left, common = [first], rows - first.request.count, key(first)
 
             def joins(job: Job) -> bool:
                 return key(job) == common and job.request.count <= left
 
             while common is not None and left > 0 and (more := self._next(joins)) is not None:
-                taken.append(more)
+                batch.append(more)
                 left -= more.request.count
-            return taken
+            return batch
 
     def remove(self, job: Job) -> None:
         """Take a job out of the queue, if it is in it."""

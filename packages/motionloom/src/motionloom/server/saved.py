@@ -1,6 +1,6 @@
 """The project's JSON with its id and revision: what was saved is replaced by nobody who has not seen it.
 
-A page says with what it saves which project that is (``id``) and which state of it was changed (``revision``). Where
+A page sends with what it saves which project that is (``id``) and which state of it was changed (``revision``). Where
 the folder has another one, or another state, that is refused with 409, and the page asks its user. The server counts:
 every save is one revision more. It also writes who saved and from which revision on (``written``), so that a client
 whose answer was lost is not taken for somebody else. What cannot be read is put aside under another name, never
@@ -52,7 +52,7 @@ class Stamp:
         return {"id": self.id, "revision": self.revision}
 
     def follows(self, other: "Stamp") -> bool:
-        """Whether what is saved with this stamp was made in sight of all that the other one stands for."""
+        """Whether what is saved with this stamp was based on all that the other one covers."""
         if self.id != other.id:
             return False
         own = bool(self.client) and self.client == other.client and other.base <= self.revision <= other.revision
@@ -81,16 +81,16 @@ class Saved:
     def stamp(self) -> Stamp | None:
         """Of what was saved last; None where nothing was. Raises `Refusal` 422 for what is no JSON."""
         with self._lock:
-            seen = self.project.saved_version()
-            if seen is None:
+            mark = self.project.saved_version()
+            if mark is None:
                 return None
-            if self._known[0] != seen:
+            if self._known[0] != mark:
                 try:
                     data = self.project.read_project()
                 except OSError as error:
                     why = f"project.json in the project folder cannot be read ({error.strerror}); {ASIDE}"
                     raise Refusal(422, why) from None
-                self._known = seen, None if data is None else _stamp_of(_parsed(data))
+                self._known = mark, None if data is None else _stamp_of(_parsed(data))
             return self._known[1]
 
     def save(self, data: bytes, client: str, over: str | None) -> Stamp:
@@ -101,16 +101,16 @@ class Saved:
         """
         value = parse_json(data, "the project")
         with self._lock:
-            there, asked = self.stamp(), _stamp_in(value, client)
-            if there is None or asked.follows(there):
-                return self._follow(data, value, asked, there)
+            there, new = self.stamp(), _stamp_in(value, client)
+            if there is None or new.follows(there):
+                return self._follow(data, value, new, there)
             if over is None or over != f"{there.id or ''}.{there.revision}":
-                raise Refusal(409, _sentence(there, asked), more=there.public())
-            if asked.id == there.id:
-                return self._follow(data, value, asked, there)
+                raise Refusal(409, _sentence(there, new), more=there.public())
+            if new.id == there.id:
+                return self._follow(data, value, new, there)
             self._shelve(there)
-            stamp = self._follow(data, value, asked, None)
-            self._taken_off(asked)
+            stamp = self._follow(data, value, new, None)
+            self._taken_off(new)
             return stamp
 
     def rows(self) -> list[dict[str, Any]]:
@@ -149,16 +149,16 @@ class Saved:
         else:
             self.project.shelf.keep(there.id, data)
 
-    def _taken_off(self, asked: Stamp) -> None:
+    def _taken_off(self, new: Stamp) -> None:
         """What was kept of a project that is open now is gone, or is a project of its own where nobody has seen it."""
-        data = self.project.shelf.read(str(asked.id))
+        data = self.project.shelf.read(str(new.id))
         if data is None:
             return
         value = _parsed(data)
-        if not asked.follows(_stamp_of(value)):
+        if not new.follows(_stamp_of(value)):
             name = secrets.token_hex(8)
             self.project.shelf.keep(name, json.dumps(value | {"id": name}).encode())
-        self.project.shelf.drop(str(asked.id))
+        self.project.shelf.drop(str(new.id))
 
     def aside(self) -> str:
         """Give what is saved another name, which is returned; raises `Refusal` 404 where nothing is."""
@@ -168,19 +168,19 @@ class Saved:
             raise Refusal(404, "there is no project in the folder yet")
         return name
 
-    def _follow(self, data: bytes, value: Any, asked: Stamp, there: Stamp | None) -> Stamp:
-        if asked.id is None:
+    def _follow(self, data: bytes, value: Any, new: Stamp, there: Stamp | None) -> Stamp:
+        if new.id is None:
             self.project.save_project(data)
-            return asked
-        own = there is not None and asked.client == there.client and asked.client != ""
-        base = there.base if there is not None and own else asked.revision if there is None else there.revision
-        revision = max(asked.revision, there.revision if there is not None else 0) + 1
-        return self._write(value, Stamp(asked.id, revision, asked.client, base))
+            return new
+        own = there is not None and new.client == there.client and new.client != ""
+        base = there.base if there is not None and own else new.revision if there is None else there.revision
+        revision = max(new.revision, there.revision if there is not None else 0) + 1
+        return self._write(value, Stamp(new.id, revision, new.client, base))
 
     def _write(self, value: dict[str, Any], stamp: Stamp) -> Stamp:
-        written = {"by": stamp.client, "from": stamp.base}
-        found = value | {"id": stamp.id, "revision": stamp.revision, "written": written}
-        self.project.save_project(json.dumps(found).encode())
+        origin = {"by": stamp.client, "from": stamp.base}
+        stamped = value | stamp.public() | {"written": origin}
+        self.project.save_project(json.dumps(stamped).encode())
         return stamp
 
 
@@ -194,13 +194,13 @@ def _parsed(data: bytes) -> Any:
 def _stamp_of(value: Any) -> Stamp:
     """The stamp in what was saved; what is no stamp counts as none."""
     try:
-        found = _stamp_in(value, "")
+        stamp = _stamp_in(value, "")
     except MotionloomError:
         return Stamp(None)
-    written = value.get("written") if isinstance(value, dict) else None
-    if isinstance(written, dict) and isinstance(written.get("by"), str) and isinstance(written.get("from"), int):
-        return Stamp(found.id, found.revision, written["by"], written["from"])
-    return found
+    origin = value.get("written") if isinstance(value, dict) else None
+    if isinstance(origin, dict) and isinstance(origin.get("by"), str) and isinstance(origin.get("from"), int):
+        return Stamp(stamp.id, stamp.revision, origin["by"], origin["from"])
+    return stamp
 
 
 def _stamp_in(value: Any, client: str) -> Stamp:
@@ -215,12 +215,12 @@ def _stamp_in(value: Any, client: str) -> Stamp:
     return Stamp(name, revision, client)
 
 
-def _sentence(there: Stamp, asked: Stamp) -> str:
-    if there.id != asked.id:
+def _sentence(there: Stamp, new: Stamp) -> str:
+    if there.id != new.id:
         return "the folder holds another project; read it with GET /project before you replace it"
     return (
         f"the project was saved by somebody else meanwhile: its revision is {there.revision}, and this was made from "
-        f"{asked.revision}; read it with GET /project"
+        f"{new.revision}; read it with GET /project"
     )
 
 

@@ -98,21 +98,21 @@ def read_robots(models: Sequence[Path]) -> "dict[str, Robot]":
         return {}
     from motionloom.robots.body import read_robot
 
-    found = {}
+    robots = {}
     for path in models:
-        if path.stem in found:
+        if path.stem in robots:
             raise MotionloomError(f"two robots are called {path.stem}; give their files names of their own")
-        found[path.stem] = read_robot(path)
-        for note in found[path.stem].remarks():
+        robots[path.stem] = read_robot(path)
+        for note in robots[path.stem].remarks():
             print(f"note: {note}", file=sys.stderr)
-    return found
+    return robots
 
 
 class _Live:
-    """Somebody who is steered while he moves (docs/live.md), behind the same door as everything else.
+    """A person who is steered while they move (docs/live.md), behind the same door as everything else.
 
-    Live sessions need what draws, whose import takes longer than all the rest of a server's start. So they are made for
-    the first client that asks; the worker's thread imports it meanwhile, while the page is answered already.
+    Live sessions need the sampler, whose import takes longer than all the rest of a server's start. So they are created
+    for the first client; the worker's thread imports it meanwhile, while the page is answered already.
     """
 
     def __init__(self, worker: Worker, robots: "Mapping[str, Robot]") -> None:
@@ -148,13 +148,13 @@ class _Live:
 def _bound(host: str, port: int) -> socket.socket:
     try:
         family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        made = socket.socket(family, kind, protocol)
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        made.bind(place)
-        made.listen(128)  # who connects from now on waits until the application is up
+        listener = socket.socket(family, kind, protocol)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(place)
+        listener.listen(128)  # later connections wait until the application is up
     except (OSError, OverflowError) as error:
         problem = getattr(error, "strerror", None) or error
         raise MotionloomError(
             f"cannot serve at {host}, port {port}: {problem}; name another --port or --host"
         ) from None
-    return made
+    return listener

@@ -57,26 +57,26 @@ class Shelf:
         """What a list shows of each project, the one that was saved last first; what cannot be read is left out."""
         for place in sorted(self.folder.glob("*.json"), key=lambda place: -place.stat().st_mtime_ns):
             try:
-                found = parse_json(place.read_bytes(), place.name)
+                project = parse_json(place.read_bytes(), place.name)
             except (OSError, MotionloomError):
                 continue
-            if isinstance(found, dict) and isinstance(found.get("id"), str) and self._place(found["id"]) == place:
-                yield row(found, place.stat().st_mtime)
+            if isinstance(project, dict) and isinstance(project.get("id"), str) and self._place(project["id"]) == place:
+                yield row(project, place.stat().st_mtime)
 
     def _place(self, name: str) -> Path:
         return self.folder / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.json"
 
 
-def row(found: dict[str, Any], saved: float) -> dict[str, Any]:
+def row(project: dict[str, Any], saved: float) -> dict[str, Any]:
     """What a list shows of a project: its id and name, when it was saved, its first words and its kept motion."""
-    segments = [one for one in _list(found.get("segments")) if isinstance(one, dict)]
-    takes, kept = _list(found.get("takes")), found.get("kept", 0)
-    take = takes[kept] if isinstance(kept, int) and 0 <= kept < len(takes) else None
+    segments = [one for one in _list(project.get("segments")) if isinstance(one, dict)]
+    takes, index = _list(project.get("takes")), project.get("kept", 0)
+    take = takes[index] if isinstance(index, int) and 0 <= index < len(takes) else None
     motion = take.get("motion") if isinstance(take, dict) else None
     seconds = [one.get("seconds") for one in segments]
     return {
-        "id": found["id"],
-        "name": str(found.get("name", ""))[:80],
+        "id": project["id"],
+        "name": str(project.get("name", ""))[:80],
         "saved": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(saved)),
         "words": [str(one.get("text", ""))[:120] for one in segments[:WORDS]],
         "blocks": len(segments),

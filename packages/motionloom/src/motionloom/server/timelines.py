@@ -26,7 +26,7 @@ _Quoting.add_representer(str, _quoted)
 
 
 def timeline_from_json(value: Any, project: Project, limits: Limits) -> Timeline:
-    """A timeline's JSON; a mistake names the keys that lead to it."""
+    """A timeline's JSON; a mistake is reported with its keys."""
     if not isinstance(value, Mapping):
         raise MotionloomError("a timeline is a mapping with 'segments', as its YAML file is")
     return _checked(timeline_from(value, folder=project.motions), limits)

@@ -1,4 +1,4 @@
-"""The worker: one thread with the prior loaded once, which draws what the queue gives it, batch by batch."""
+"""The worker: one thread with the prior loaded once, which samples what the queue gives it, batch by batch."""
 
 import logging
 import sys
@@ -25,11 +25,11 @@ ROWS = 8
 
 
 class _Cancelled(Exception):
-    """Nobody wants what is being drawn any more."""
+    """The jobs of a batch were cancelled."""
 
 
 class Worker:
-    """Jobs by their ids, and the thread that draws them."""
+    """Jobs by their ids, and the thread that samples them."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Worker:
         self.weights, self.device, self.adapters = weights, device, adapters
         self.models: Models | None = None
         self.problem: str | None = None
-        """Why nothing can be drawn."""
+        """Why nothing can be sampled."""
         self._jobs: dict[str, Job] = {}
         self._lock = threading.Lock()
         self._loaded = threading.Event()
@@ -52,7 +52,7 @@ class Worker:
 
     @property
     def warm(self) -> bool:
-        """Whether the prior is loaded and has drawn once."""
+        """Whether the prior is loaded and has sampled once."""
         return self.models is not None
 
     def prior(self) -> "Prior":
@@ -63,7 +63,7 @@ class Worker:
         return self.models.prior
 
     def start(self) -> None:
-        """Begin to load the prior, and to draw."""
+        """Begin to load the prior, and to sample."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -93,7 +93,7 @@ class Worker:
             return self._jobs[name]
 
     def cancel(self, job: Job) -> None:
-        """End a job: one that waits at once, one that is drawn at the next network call."""
+        """End a job: one that waits at once, one that is sampled at the next network call."""
         self.queue.remove(job)
         job.end("cancelled")
 
@@ -133,12 +133,12 @@ class Worker:
         from motionloom.tasks.text import generate
 
         models = Models(self.weights, device=self.device, adapters=self.adapters)
-        # what the first call makes ready, no client waits for
+        # so that no client waits for what the first call sets up
         generate(models.prior, "a person walks", seconds=1.0, steps=2)
         return models
 
     def _draw(self, models: "Models", jobs: Sequence[Job]) -> None:
-        """Draw one batch; whatever goes wrong is said in its jobs."""
+        """Sample one batch; whatever goes wrong is reported in its jobs."""
         from motionloom.tasks.watching import watching
 
         if not jobs:
@@ -154,7 +154,7 @@ class Worker:
                 job.end("failed", refusal.sentence, refusal.status)
 
     def _refusal(self, error: Exception) -> Refusal:
-        """What clients are told of an error of a job."""
+        """What is reported of an error of a job."""
         if (full := full_disk(error)) is not None:
             return full
         if isinstance(error, Refusal):
@@ -214,11 +214,11 @@ class Worker:
         )
 
     def _progress(self, jobs: Sequence[Job]) -> Callable[[int, int], None]:
-        def progress(done: int, of: int) -> None:
+        def progress(calls: int, of: int) -> None:
             self._check(jobs)
             for job in jobs:
                 if not job.finished:
-                    job.progress(done, of)
+                    job.progress(calls, of)
 
         return progress
 
@@ -230,34 +230,34 @@ class Worker:
         owners = [(job, row) for job in jobs for row in range(job.request.count)]
         walks = 0
 
-        def seen(denoised: "Denoised") -> None:
+        def report(denoised: "Denoised") -> None:
             nonlocal walks
             self._check(jobs)
-            walks += denoised.done == 1
+            walks += denoised.move == 1
             if jobs[0].request.task == "switch":  # which reports no progress itself
                 count = jobs[0].request.count
-                jobs[0].progress(min(walks - 1, count - 1) * denoised.of + denoised.done, count * denoised.of)
-            if not any(_wants(job, denoised.done) for job in jobs):
+                jobs[0].progress(min(walks - 1, count - 1) * denoised.of + denoised.move, count * denoised.of)
+            if not any(_wants(job, denoised.move) for job in jobs):
                 return
             for row, poses in zip(denoised.rows, denoised.positions(), strict=True):
                 job, number = owners[row] if together or denoised.rows != (0,) else _alone(jobs[0], walks)
-                if _wants(job, denoised.done):
-                    job.level(denoised.done, denoised.of, number, placed(job.request, poses), denoised.begin)
+                if _wants(job, denoised.move):
+                    job.level(denoised.move, denoised.of, number, placed(job.request, poses), denoised.begin)
 
-        return seen
+        return report
 
     def _check(self, jobs: Sequence[Job]) -> None:
         if all(job.finished for job in jobs):
             raise _Cancelled
 
 
-def _wants(job: Job, done: int) -> bool:
+def _wants(job: Job, calls: int) -> bool:
     """Whether a job's poses are sent after so many network calls."""
-    return not job.finished and job.request.levels > 0 and done % job.request.levels == 0
+    return not job.finished and job.request.levels > 0 and calls % job.request.levels == 0
 
 
 def _alone(job: Job, walks: int) -> tuple[Job, int]:
-    """Whose row it is where motions are drawn one after the other: of a job, that which its progress has come to."""
+    """Whose row it is where motions are sampled one after the other: of a job, that which its progress has come to."""
     count = job.request.count
-    done = walks - 1 if job.request.task == "switch" else job.done * count // max(job.of, 1)
-    return job, min(done, count - 1)
+    number = walks - 1 if job.request.task == "switch" else job.calls * count // max(job.of, 1)
+    return job, min(number, count - 1)

@@ -1,7 +1,7 @@
 """Control: motions that meet a goal in the world, from a prompt.
 
 The goal is seen from the person's ground pose at frame 0; there it steers every denoised estimate of the sampler
-(`steering`); the sampled motion is put into the world and fitted to what is left of the targets (`fitting`).
+(`steering`); the sampled motion is placed in the world and fitted to what is left of the targets (`fitting`).
 """
 
 from collections.abc import Callable, Sequence
@@ -66,7 +66,7 @@ def control(
     progress: Progress | None = None,
     **settings: Unpack[Settings],
 ) -> list[Controlled]:
-    """Make motions of the goal's length that do what ``prompt`` says and meet ``goal``.
+    """Generate motions of the goal's length that do what ``prompt`` says and meet ``goal``.
 
     Args:
         prior: weights that make HumanML3D's 263 numbers.
@@ -74,7 +74,7 @@ def control(
         goal: in the world, metres, at 20 frames per second; the person's ground pose in frame 0 is its `start_of`.
         adapters: networks trained to see the targets, each alone or with its weight (the mean of all by default);
             "fitting" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own network: the shipped
-            ones were measured to make no smaller errors but more jerk (docs/decisions/0012).
+            ones were measured to have no smaller errors but more jerk (docs/decisions/0012).
         fit: fit the sampled motion to the goal.
         foot_lock: keep planted feet still.
         sampling: or single settings of it as keywords; motion i is sampled from ``seed + i`` alone.
@@ -144,8 +144,8 @@ def steered_features(
     def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
         if not nets:
             return corrected(denoise, [change] * len(batch.rows))
-        shown = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.strength(prior.schedule))
-        return _conditioned(shown, change, prior, mask)
+        net = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.strength(prior.schedule))
+        return _conditioned(net, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
     states = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=single_person_view(prior)))
@@ -210,8 +210,8 @@ def _conditioned(
         if last is None:
             denoised = net(np.zeros_like(state), np.zeros(state.shape, np.bool_))(state, level)
         else:
-            shown = mix(state, prior.schedule.at(level)[0] * last, mask)
-            denoised = net(last, np.broadcast_to(mask, state.shape))(shown, level)
+            mixed = mix(state, prior.schedule.at(level)[0] * last, mask)
+            denoised = net(last, np.broadcast_to(mask, state.shape))(mixed, level)
         last = np.stack([change(row, level) for row in denoised])
         return last
 

@@ -128,14 +128,14 @@ class Smooth(SpanChange):
 
     def apply(self, sampler: Any, clip: Motion, seed: int) -> Motion:
         """The clip, smoothed; feet that stood still stand still, if the sampler keeps them and the legs do not stay."""
-        kept, width = kept_parts_of(clip, self.keep), self.seconds * clip.fps / 2
+        parts, width = kept_parts_of(clip, self.keep), self.seconds * clip.fps / 2
         turns = gaussian_smooth(rot.unroll(clip.rotations).reshape(len(clip), -1), width).reshape(clip.rotations.shape)
         smoothed = with_place(replace(clip, rotations=rot.normalize(turns)), gaussian_smooth(place_of(clip), width))
         if sampler.foot_lock and not joints_of(self.keep).issuperset(SMPL22.groups["lower_body"]):
             still = planted_feet(to_smpl22(clip).positions(), clip.fps)
             smoothed = onto(clean_feet(to_smpl22(smoothed), contacts=still), smoothed)
         for first, last in self.frames(clip):
-            clip = splice(clip, smoothed, first, last=last, kept=kept)
+            clip = splice(clip, smoothed, first, last=last, keep=parts)
         return clip
 
 
@@ -176,7 +176,7 @@ def kept_parts_of(clip: Motion, keep: Sequence[str]) -> KeptParts:
     return kept_parts(clip.skeleton, joints_of(keep), np.array([level, whole, level]))
 
 
-def _overlay_stretch(clip: Motion, source: Motion, first: int, kept: KeptParts) -> Motion:
+def _overlay_stretch(clip: Motion, source: Motion, first: int, parts: KeptParts) -> Motion:
     last = first + len(source)
     there = clip.frames(first, last)
     piece = source if source.skeleton == clip.skeleton else onto(to_smpl22(source), there)
@@ -184,4 +184,4 @@ def _overlay_stretch(clip: Motion, source: Motion, first: int, kept: KeptParts) 
     # Outside it is as at its ends: from how far that is from the clip, the splice eases in and out.
     at = np.clip(np.arange(len(clip)) - first, 0, len(piece) - 1)
     extended = with_place(replace(clip, rotations=piece.rotations[at]), place_of(piece)[at])
-    return splice(clip, extended, first, last=last, kept=kept)
+    return splice(clip, extended, first, last=last, keep=parts)

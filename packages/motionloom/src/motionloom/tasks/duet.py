@@ -79,7 +79,7 @@ def react(
     Args:
         motion: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The
             second is the 22-joint person, of as many frames at that rate, in the same world and on the same floor.
-        prompt: as of `pair.generate_pair`; an empty one asks for nothing in particular.
+        prompt: as of `pair.generate_pair`; an empty one is no condition.
         foot_lock: keep the second person's planted feet still.
         sampling, progress: as of `pair.generate_pair`.
 
@@ -119,7 +119,7 @@ def compose_pair(
     progress: Moves | None = None,
     **settings: Unpack[PairSettings],
 ) -> Iterator[Duet]:
-    """One long duet, block after block in one world, as it is made; in memory that does not grow with its length.
+    """One long duet, block after block in one world, as it is sampled; in memory that does not grow with its length.
 
     Args:
         segments: as of `long.compose`; a text with "::" in it says what the first and what the second person does. In
@@ -279,7 +279,7 @@ class _PairRow:
 
 @dataclass(frozen=True, eq=False)
 class _PairDenoiser:
-    """Guided estimates of rows of a chain; each row remembers its last one, which says where the next row begins."""
+    """Guided estimates of rows of a chain; each row remembers its last one, from which the next row begins."""
 
     prior: Prior
     net: PairSession
@@ -316,14 +316,14 @@ class _PairDenoiser:
 
     def __call__(self, rows: Sequence[_PairRow], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
         parts = [_split_state(state) for state in states]
-        shown = [
+        inputs = [
             join(self._conditioning_pose(row, places, level), motion)
             for row, (motion, places), level in zip(rows, parts, at, strict=True)
         ]
         nets = {id(person): row.net for row in rows for person in row.people}
         denoised = guided_estimates(
             [person for row in rows for person in row.people],
-            [state for pair in shown for state in pair],
+            [state for pair in inputs for state in pair],
             [level for level in at for _ in (0, 1)],
             net=lambda person: nets[id(person)],
             slots=1,
@@ -359,7 +359,7 @@ class _PairDenoiser:
         return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
 
     def _begin_poses_or_sampled(self, places: np.ndarray, row: _PairRow, level: int) -> np.ndarray:
-        """The same; for the first row and at the first level what D (2, 4) says."""
+        """The same; for the first row and at the first level that of D (2, 4)."""
         begin = self._begin_poses(row, level)
         return self.net.places.decode(places) if begin is None else begin
 

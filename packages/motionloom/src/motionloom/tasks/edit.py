@@ -158,10 +158,10 @@ def edit(
     Args:
         prior: weights that make HumanML3D's 263 numbers.
         motion: the clip, on any humanoid skeleton and at any rate; what is not changed comes back bit for bit.
-        text: what the person does; an empty one asks for nothing in particular.
+        text: what the person does; an empty one is no condition.
         changes: `Redraw`, `Extend`, `Loop`, `Overlay`, `Look`, `Nod` and `Smooth`, one after the other; a text
             alone redraws the whole clip.
-        skeleton: the clip's own, or the 22-joint person. The result stands where the clip stood.
+        skeleton: the clip's own, or the 22-joint person. The result is where the clip was.
         foot_lock: keep planted feet still where legs are sampled.
         sampling: or single settings of it as keywords; version i of ``count`` is sampled from ``seed + i``.
         progress: called after each network call with the calls done and the calls in all.
@@ -239,11 +239,11 @@ def _in_stages(progress: Progress | None, stages: int, steps: int) -> Progress:
     """What the stages of all versions report to, one after the other, each as so many steps."""
     before = 0
 
-    def report(done: int, calls: int) -> None:
+    def report(calls: int, total: int) -> None:
         nonlocal before
         if progress:
-            progress(round((before + done / calls) * steps), stages * steps)
-        before += done == calls
+            progress(round((before + calls / total) * steps), stages * steps)
+        before += calls == total
 
     return report
 
@@ -290,7 +290,7 @@ def _inpaint_span(sampler: _Sampler, motion: Motion, span: tuple[int, int], chan
     first, last = start - begin, stop - begin
     stretch = _inpaint_window(window, first, last, keep=kept_feature_mask(change.keep), strength=change.strength)
     sampled = sampler.sample(window, replace(stretch, begin=begin / motion.fps), seed)
-    spliced = splice(window, sampled, first, last=last, kept=kept_parts_of(motion, change.keep))
+    spliced = splice(window, sampled, first, last=last, keep=kept_parts_of(motion, change.keep))
     before = [motion.frames(0, start)] if start else []
     behind = [motion.frames(stop, len(motion))] if stop < len(motion) else []
     return concatenate(*before, spliced.frames(first, last), *behind)
@@ -351,7 +351,7 @@ def _check(prior: Prior, motion: Motion, changes: Sequence[Change]) -> None:
 
 
 # What is sampled: a stretch of a person's motion between frames that are known, which stay (Lugmayr et al.,
-# "RePaint", CVPR 2022, without its repetitions). Where the motion goes on behind it, every denoised estimate is made
+# "RePaint", CVPR 2022, without its repetitions). Where the motion goes on behind it, every denoised estimate is bent
 # to arrive there: features hold velocities of the root, nothing else would.
 
 Array = NDArray[np.float64]
@@ -362,7 +362,7 @@ def inpaint_motion(
 ) -> PlacedMotion:
     """A whole window with the frames ``first`` to before ``last`` sampled by the text; the others come back to float32.
 
-    An empty text asks for nothing in particular. Frames from 0 on are placed by the next ones.
+    An empty text is no condition. Frames from 0 on are placed by the next ones.
     """
     whole = PlacedMotion.of(window.positions)
     known = whole.features[None]

@@ -5,7 +5,7 @@ side, and neighbours agree on what they share at every level (`diffusion.stagger
 knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
 together, and a moving window of frames becomes positions and a body.
 
-The published procedure and that of the paper are in `lab.papers.double_take`; docs/decisions/0013 tells them apart.
+The published procedure and that of the paper are in `lab.papers.double_take`; docs/decisions/0013 compares them.
 """
 
 from collections import deque
@@ -94,7 +94,7 @@ def compose(
     progress: Moves | None = None,
     **settings: Unpack[Settings],
 ) -> Iterator[Motion]:
-    """One long motion of the 22-joint person, block after block in one world, as it is made.
+    """One long motion of the 22-joint person, block after block in one world, as it is sampled.
 
     Args:
         prior: weights that make HumanML3D's 263 numbers at 20 frames per second.
@@ -105,7 +105,7 @@ def compose(
         path: where the pelvis is on the ground in each frame of the whole (`Goal` of that length, in the world).
         foot_lock: keep planted feet still.
         sampling: or single settings of it as keywords; segment i is sampled from ``seed + i``.
-        progress: called with how many more row moves were made; a segment takes as many as there are steps.
+        progress: called with the number of further row moves; a segment takes as many as there are steps.
 
     Raises:
         MotionloomError: for an impossible request.
@@ -176,7 +176,7 @@ def long_features(
 ) -> Iterator[np.ndarray]:
     """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
 
-    Piece i has ``round(seconds * fps)`` frames, the first and the last one more where ``past`` says so. begin: as of
+    Piece i has ``round(seconds * fps)`` frames, the first and the last one more by ``past``. begin: as of
     `watching.Denoised`. ``batch_size``: rows per network call; it changes speed and memory, not
     the result. ``count``: so many motions, the pieces of one behind those of the other; there must be an end of the
     segments then. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
@@ -369,7 +369,7 @@ def last_frames(motion: Motion) -> PlacedMotion:
 
 
 def holding_correction(own: np.ndarray, prior: Prior, length: int, *, last: bool = False) -> Correction:
-    """Makes the first frames of a row's estimate (or the last ones) known ones, the others join them without a jump.
+    """Sets the first frames of a row's estimate (or the last ones) to known ones, the others join them without a jump.
 
     own: (frames, 263) features, not standardised. length: frames of the row.
     """

@@ -72,9 +72,9 @@ def pair_features(
 
     Args:
         net: the block over the prior's network.
-        prompts: one per row; rows are people, a0, b0, a1, b1, ...; an empty prompt asks for nothing.
+        prompts: one per row; rows are people, a0, b0, a1, b1, ...; an empty prompt is no condition.
         frames: of each motion.
-        seeds: one per row. With a block that says nothing a row is what `text.sample_features` makes of its seed.
+        seeds: one per row. With a silent block a row is that of `text.sample_features` with its seed.
         edits: what is known, and what changes the estimates.
         sampling: or single settings of it as keywords; ``batch_size`` counts pairs.
 
@@ -82,10 +82,8 @@ def pair_features(
         MotionloomError: for an impossible request.
     """
     chosen, rows, row_edits = PairSampling.of(sampling, settings), len(prompts), edits or PairEdits()
-    changes, meetings = (
-        list(row_edits.corrections or [None] * rows),
-        row_edits.meetings or [None] * (rows // 2),
-    )
+    changes = list(row_edits.corrections or [None] * rows)
+    meetings = row_edits.meetings or [None] * (rows // 2)
     frozen = [one is not None for one in changes] if row_edits.frozen is None else list(row_edits.frozen)
     if rows % 2 or rows == 0 or {len(seeds), len(changes), len(frozen)} != {rows}:
         raise MotionloomError(
@@ -173,7 +171,7 @@ def pair_seeds(sampling: PairSampling) -> list[int]:
 
 
 def meetings_of(prompts: tuple[str, str], sampling: PairSampling) -> list[Meeting | None]:
-    """How the two of each duet touch, where their prompts say that they do."""
+    """How the two of each duet touch, where their prompts have a contact."""
     contact = read_contact(prompts) if sampling.bodies else None
     return [Meeting(contact) if contact else None for _ in range(sampling.number())]
 
@@ -193,11 +191,11 @@ def generate_pair(
     progress: Progress | None = None,
     **settings: Unpack[PairSettings],
 ) -> list[Duet]:
-    """Make duets: two people of the 22-joint skeleton at 20 frames per second in one world.
+    """Generate duets: two people of the 22-joint skeleton at 20 frames per second in one world.
 
     Args:
-        block: what makes two people of one prior.
-        prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` says the same.
+        block: weights for two people with this prior.
+        prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` is the same.
         seconds: length; not looked at where there is a goal, which has its own.
         goals: targets of the first and the second person in the world, who then start at its `start_of`; two
             goals are of one length. Without any the first person starts at the origin facing +Z.
@@ -245,7 +243,7 @@ def _goal_frames(goals: Sequence[Goal | None]) -> int:
 
 
 def check_pair(prior: Prior, *, count: int = 1, seconds: float = 0.0) -> None:
-    """Raise MotionloomError for weights that make no two people, and for more than one call makes."""
+    """Raise MotionloomError for weights that are not for two people, and for more duets than one call gives."""
     check_humanml(prior, "two people need")
     if count > 1 and count * seconds > MOST:
         raise MotionloomError(
@@ -273,7 +271,7 @@ def complete_pair(
     Args:
         past: motions of two people in one world, of equal rate and length, a second or more; each on any humanoid
             skeleton that stands upright along +Y, which it keeps. The network sees the last `PAST_FRAMES`.
-        prompt: as of `generate_pair`; an empty one asks for nothing in particular.
+        prompt: as of `generate_pair`; an empty one is no condition.
         seconds: how far to go on.
         foot_lock: keep planted feet still.
         sampling, progress: as of `generate_pair`.

@@ -52,7 +52,7 @@ def known_state(net: PairSession, known: PairMotion, frames: int) -> Observed:
 
 
 def finish_person(prior: Prior, pair: PairMotion, person: int, *, foot_lock: bool) -> Motion:
-    """One of two people, 0 or 1, in their world, as `finish` makes a motion of features."""
+    """One of two people, 0 or 1, in their world, by `finish`."""
     motion = finish(prior, pair.features[person], foot_lock=foot_lock)
     return motion.placed(GroundPose.of_numbers(pair.poses[person]))
 
@@ -142,9 +142,9 @@ class PairPast:
 
     def _extend_person(self, person: int, places: Array, contacts: Array, added: int, foot_lock: bool) -> Motion:
         motion, last = self.motions[person], self.known.features.shape[-2] - 1
-        shown = int(last / FPS * motion.fps + 1e-6) + 1
-        tail = motion.frames(len(motion) - shown, len(motion))
-        at = (np.arange(shown + max(added, SHORTEST_SEAM)) - (shown - 1)) / motion.fps * FPS + last
+        count = int(last / FPS * motion.fps + 1e-6) + 1
+        tail = motion.frames(len(motion) - count, len(motion))
+        at = (np.arange(count + max(added, SHORTEST_SEAM)) - (count - 1)) / motion.fps * FPS + last
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
         sampled = positions_at(self.to_own_scale(person, places), at)
         new = continue_motion(tail, sampled, contacts=contacts[nearest], foot_lock=foot_lock)

@@ -1,8 +1,8 @@
 """What somebody does next: many futures of a clip, on its own skeleton and at its own rate.
 
 The clip becomes the uniform person, a predictor completes window after window (`tasks.completion`), and each future is
-put behind the clip, which stays bit for bit (`tasks.splice`). Some parts can be held to another motion's, and a future
-can be made to arrive at one.
+appended to the clip, which stays bit for bit (`tasks.splice`). Some parts can be held to another motion's, and a future
+can arrive at one.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -68,7 +68,7 @@ def predict(
     progress: Progress | None = None,
     **settings: Unpack[PredictionSettings],
 ) -> list[Motion]:
-    """Motions that begin with the past, bit for bit, and go on for ``seconds``: futures, 10 unless ``count`` says.
+    """Motions that begin with the past, bit for bit, and go on for ``seconds``: futures, 10 without a ``count``.
 
     Args:
         predictor: from `Predictor.load`.
@@ -79,7 +79,7 @@ def predict(
         root: predict the way through the world too; False: the person stays in place, as published (Chen et al. 2023).
         foot_lock: keep planted feet still.
         sampling: or single settings of it as keywords. Future i is sampled from (``seed``, i). A guidance of 1 heeds
-            the past as learned; a temperature above 1 makes livelier and more various futures.
+            the past as learned; a temperature above 1 gives livelier and more various futures.
         progress: called after each window with the windows done and the windows in all.
 
     Raises:
@@ -162,7 +162,7 @@ def switch(
         seconds: between the two.
         facing: "turned" lets the target face as the past does where it ends; "kept" leaves it as it is.
         foot_lock: keep planted feet still.
-        sampling: or single settings of it as keywords; one motion is made unless ``count`` says otherwise.
+        sampling: or single settings of it as keywords; one motion without a ``count``.
 
     Raises:
         MotionloomError: for an impossible request.
@@ -198,8 +198,8 @@ def _arrive(
     predictor, past, person, rate, tail = sampler.predictor, history.motion, history.person, history.rate, history.tail
     arrival = (gap + 1) * rate
     room = predictor.frames - len(person)
-    shown = max(min(TARGET * predictor.fps, (len(target) - 1) * rate), 2.0)  # two places of the grid give a velocity
-    last = min(room, int(arrival + shown))
+    span = max(min(TARGET * predictor.fps, (len(target) - 1) * rate), 2.0)  # two places of the grid give a velocity
+    last = min(room, int(arrival + span))
     at = np.arange(1, last + 1)
     goal = to_smpl22(target.frames(0, min(len(target), round(CONTEXT * past.fps) + 2))).positions()
     turn = 0.0
@@ -232,23 +232,23 @@ def _continue_past(
     """``total`` frames behind the past, in pieces of about `CHUNK` seconds; ``windows`` (frames, 22, 3) are read as
     needed."""
     fps, rate, tail, grid = past.motion.fps, past.rate, past.tail, past.person
-    tail_length, longest_grid, done = len(tail), 2 * past.predictor.observed, 0
+    tail_length, longest_grid, begin = len(tail), 2 * past.predictor.observed, 0
     zero = len(grid) - 1  # the grid's index of the past's last frame
     for places in windows:
         grid = np.concatenate([grid, places])
         ready = min(int((len(grid) - 1 - zero) / rate + 1e-6), total)
-        if ready < total and ready - done < CHUNK * fps:
+        if ready < total and ready - begin < CHUNK * fps:
             continue
-        at = (done + np.arange(len(tail) + ready - done) - (len(tail) - 1)) * rate + zero
+        at = (begin + np.arange(len(tail) + ready - begin) - (len(tail) - 1)) * rate + zero
         new = continue_motion(tail, positions_at(grid, at), foot_lock=foot_lock)
-        new = hold.overlay_on(new, done) if hold else new
+        new = hold.overlay_on(new, begin) if hold else new
         yield new
-        done = ready
+        begin = ready
         tail = concatenate(tail, new)
         tail = tail.frames(max(len(tail) - tail_length, 0), len(tail))
-        drop = max(int(done * rate + zero) - longest_grid, 0)
+        drop = max(int(begin * rate + zero) - longest_grid, 0)
         grid, zero = grid[drop:], zero - drop
-        if done == total:
+        if begin == total:
             return
 
 
@@ -306,13 +306,13 @@ class HeldParts:
             return None
         return Known(self.places[frames], self.mask[frames])
 
-    def overlay_on(self, new: Motion, done: int) -> Motion:
-        """A piece that begins ``done`` frames behind the past, with the held parts there."""
-        count = min(len(new), len(self.source) - done)
+    def overlay_on(self, new: Motion, begin: int) -> Motion:
+        """A piece that begins ``begin`` frames behind the past, with the held parts there."""
+        count = min(len(new), len(self.source) - begin)
         if count <= 0:
             return new
-        here = slice(done, done + count)
-        held = overlay(new.frames(0, count), self.source.frames(done, done + count), self.joints[here], self.way[here])
+        here = slice(begin, begin + count)
+        held = overlay(new.frames(0, count), self.source.frames(begin, here.stop), self.joints[here], self.way[here])
         return concatenate(held, new.frames(count, len(new))) if count < len(new) else held
 
 
@@ -367,11 +367,8 @@ def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) ->
 
 def _moved_to_past(past: Motion, source: Motion) -> Motion:
     """The source where the past ends, if it is not there."""
-    end, begin, before = (
-        ground_pose_at(past, len(past) - 1),
-        ground_pose_at(source, 0),
-        ground_pose_at(past, max(len(past) - 2, 0)),
-    )
+    end, begin = ground_pose_at(past, len(past) - 1), ground_pose_at(source, 0)
+    before = ground_pose_at(past, max(len(past) - 2, 0))
     metres, radians = end.apart(begin)
     if radians < NEAR[1] and metres < NEAR[0]:
         return source

@@ -92,7 +92,7 @@ class Plan:
     people: tuple[Motion, ...] = ()
     """The motion that is changed, gone on from or answered; all who are in it."""
     previous: tuple[Motion, Sequence[redraw.Block]] | None = None
-    """A motion of an earlier timeline and what it was sampled from: blocks that ask for the same keep its frames."""
+    """A motion of an earlier timeline and what it was sampled from: blocks with the same words keep its frames."""
     target: Motion | None = None
     """What is switched to, on the skeleton and at the rate of the first of them; what an edit takes parts of."""
     hold: FixedJoints | None = None
@@ -103,7 +103,7 @@ class Plan:
 
     @property
     def count(self) -> int:
-        """Motions to make."""
+        """Number of motions."""
         return self.sampling.number()
 
     @property
@@ -128,7 +128,7 @@ class Result:
     """What the blocks of a timeline were sampled from."""
 
 
-def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) -> Iterator[Result]:
+def run(plan: Plan, models: Models, progress: Progress = lambda calls, of: None) -> Iterator[Result]:
     """The motions of a plan as they are finished, loops closed; progress: network calls, or windows, done and in all.
 
     Raises MotionloomError for an impossible request, as the functions of the tasks do.
@@ -147,7 +147,7 @@ def run(plan: Plan, models: Models, progress: Progress = lambda done, of: None) 
 
 
 def run_each(
-    plans: Sequence[Plan], models: Models, progress: Progress = lambda done, of: None
+    plans: Sequence[Plan], models: Models, progress: Progress = lambda calls, of: None
 ) -> Iterator[tuple[int, Result]]:
     """The motions of several plans, sampled in the same network calls: (number of the plan, one of its motions).
 
@@ -165,13 +165,13 @@ def is_batched(plan: Any) -> bool:
     return plan.task != "duet" and plan.timeline is not None and not plan.timeline.readings
 
 
-def _report_group(progress: Progress, begin: int, some: int, count: int, done: int, of: int) -> None:
+def _report_group(progress: Progress, begin: int, some: int, count: int, calls: int, of: int) -> None:
     """Report how far the whole is by how far a group is."""
-    progress(begin * of + some * done, count * of)
+    progress(begin * of + some * calls, count * of)
 
 
 def close_loop(plan: Any, models: Models, result: Result) -> Result:
-    """The motion as a loop, where the request says so; an edit makes its own."""
+    """The motion as a loop, where the request is for one; an edit closes its own."""
     values = plan.values
     if plan.task == "edit" or plan.in_pieces or not getattr(values, "loop", False):
         return result
@@ -188,12 +188,12 @@ def close_loop(plan: Any, models: Models, result: Result) -> Result:
 
 def chain_progress(progress: Progress, steps: int, rows: int) -> Moves:
     """A callback for the moves of a chain of ``rows`` that reports them as progress."""
-    done = 0
+    moves = 0
 
     def moved(more: int) -> None:
-        nonlocal done
-        done += more
-        progress(done, rows * steps)
+        nonlocal moves
+        moves += more
+        progress(moves, rows * steps)
 
     return moved
 

@@ -1,4 +1,4 @@
-"""How motion is sampled: the two drivers that every task samples with, as a `Sampling` says.
+"""How motion is sampled: the two drivers that every task samples with, by a `Sampling`.
 
 `sample` denoises rows of a prior, `sample_chain` rows of a chain whose ends overlap. What a task adds to the loop are
 edits of the denoiser (goals, boundaries, the other person) and what it has `Observed`.
@@ -44,7 +44,7 @@ class Rows:
     """Prompt, length and seed of each row of a batch: one entry per row."""
 
     prompts: Sequence[str]
-    """An empty one asks for nothing in particular."""
+    """An empty one is no condition."""
     lengths: Sequence[int]
     """Tokens: frames, and the slots before them."""
     seeds: Sequence[int]
@@ -54,7 +54,7 @@ class Rows:
     """Tokens before the frames: 1 for two people."""
     patch: int = 1
     """Lengths that differ by less share a call: that many frames are a token of the network, so that little is computed
-    for padding. A row's sums are made in the same order whatever is beside it (docs/decisions/0020-bulk.md)."""
+    for padding. A row's sums are computed in the same order whatever is beside it (docs/decisions/0020-bulk.md)."""
 
     def batches(self, size: int) -> list[list[int]]:
         """Numbers of rows of as many tokens, at most ``size`` in each."""
@@ -133,12 +133,12 @@ def sample(
     net = prior.net if network is None else network
     way = sampling.levels(prior.schedule, observed.strength if observed else 1.0)
     if sampling.best_of > 1 and not halfway:
-        people, calls = view.people if view else 1, len(rows.batches(sampling.batch())) * (len(way) - 1)
-        choosing, progress = _split_progress(progress, of=calls)
+        people, total = view.people if view else 1, len(rows.batches(sampling.batch())) * (len(way) - 1)
+        choosing, progress = _split_progress(progress, of=total)
         rows = with_best_seeds(
             prior, rows, sampling, network=net, edits=edits, observed=observed, people=people, progress=choosing
         )
-    batches, done = rows.batches(sampling.batch()), 0
+    batches, calls = rows.batches(sampling.batch()), 0
     if halfway:
         way = way[: len(way) // 2 + 1]
     for numbers in batches:
@@ -168,9 +168,9 @@ def sample(
             constrain=constrain,
         )
         for snapshot in view.report_walk(walk, len(way) - 1, numbers) if view else walk:
-            state, done = snapshot.clean if halfway else snapshot.state, done + 1
+            state, calls = snapshot.clean if halfway else snapshot.state, calls + 1
             if progress:
-                progress(done, len(batches) * (len(way) - 1))
+                progress(calls, len(batches) * (len(way) - 1))
         if corrected and not halfway:
             frames = prior.smoothed(state[:, rows.slots :])
             state = denoise(np.concatenate([state[:, : rows.slots], frames], axis=1), 0)
@@ -242,12 +242,12 @@ def _split_progress(progress: Progress | None, *, of: int) -> tuple[Progress | N
         return None, None
     before = 0
 
-    def first(done: int, calls: int) -> None:
+    def first(calls: int, total: int) -> None:
         nonlocal before
-        before = calls
-        progress(done, calls + of)
+        before = total
+        progress(calls, total + of)
 
-    return first, lambda done, calls: progress(before + done, before + calls)
+    return first, lambda calls, total: progress(before + calls, before + total)
 
 
 # Rows of a chain
@@ -300,7 +300,7 @@ def sample_chain(
 
     rows: read as sampling gets there; they may be endless. denoise: rows, their states and levels to the denoised
     states. Row i is sampled from ``seed + i``, or from the best of several seeds, by candidates of the row alone.
-    batch_size: rows in one call unless ``sampling`` says it. view: how rows make motions and are seen by who is
+    batch_size: rows in one call unless ``sampling`` has it. view: how rows make motions and are seen by who is
     `watching`; where they make several, row i of motion m is sampled from ``seed + m + i``.
     """
     way, [first] = sampling.levels(prior.schedule), sampling.seeds(1)

@@ -93,26 +93,26 @@ def apply_positions(
     return onto(clean_feet(person, contacts=contacts) if foot_lock else person, old, known=known)
 
 
-def splice(old: Motion, new: Motion, first: int, *, last: int | None = None, kept: KeptParts | None = None) -> Motion:
+def splice(old: Motion, new: Motion, first: int, *, last: int | None = None, keep: KeptParts | None = None) -> Motion:
     """``old`` with the frames ``first`` to before ``last`` (the end) of ``new`` in it.
 
     Args:
         old, new: of one skeleton, frame rate and length, and both with or both without moving bones.
         first, last: frames outside are the old ones bit for bit.
-        kept: parts that are the old ones inside too; None: only joints that correspond to none of the 22.
+        keep: parts that are the old ones inside too; None: only joints that correspond to none of the 22.
     """
-    last, kept = len(old) if last is None else last, kept or kept_parts(old.skeleton)
+    last, keep = len(old) if last is None else last, keep or kept_parts(old.skeleton)
     ease = min(max(2, round(min(EASE * old.fps, (last - first) / 2))), last - first)
     turns = new.rotations
     for border, step in ((first - 1, 1), (last, -1)):
         if 0 <= border < len(old):
             turns = match_rotations(turns, old.rotations, border, step, ease)
     inside, before = slice(first, last), max(first - 1, 0)
-    turns = np.where(kept.joints[:, None], old.rotations, turns)
+    turns = np.where(keep.joints[:, None], old.rotations, turns)
     rotations, place = old.rotations.copy(), place_of(old).copy()
     rotations[inside] = rot.unroll(np.concatenate([old.rotations[before : before + 1], turns[inside]]))[1:]
     way = _eased_places(place, place_of(new), first, last, ease)
-    place[inside] = np.where(kept.place, place, way)[inside]
+    place[inside] = np.where(keep.place, place, way)[inside]
     return with_place(replace(old, rotations=rotations), place)
 
 

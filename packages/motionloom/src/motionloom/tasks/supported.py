@@ -37,14 +37,14 @@ def add_support(motion: Motion) -> Motion:
 
 
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
-    found = stairs(places, motion.fps)
-    if found is None:
+    flight = stairs(places, motion.fps)
+    if flight is None:
         return motion
     goal = Goal.nothing(len(motion))
     lift, known = np.zeros(len(motion)), np.zeros(len(motion), dtype=bool)
-    for hold, level in zip(found.holds, found.levels, strict=True):
+    for hold, level in zip(flight.holds, flight.levels, strict=True):
         ankle, frames = ANKLES[hold.side], slice(hold.first, hold.end)
-        off = level * found.rise - hold.height
+        off = level * flight.rise - hold.height
         goal.positions[frames, ankle] = np.median(places[frames, ankle], axis=0) + np.array([0.0, off, 0.0])
         goal.mask[frames, ankle] = True
         lift[frames], known[frames] = off, True

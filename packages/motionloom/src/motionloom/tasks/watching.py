@@ -1,7 +1,7 @@
 """Watching a motion while it is denoised: after each network call, the poses that the network predicts for clean data.
 
     def show(denoised: Denoised) -> None:
-        print(denoised.done, "of", denoised.of, denoised.positions().shape)
+        print(denoised.move, "of", denoised.of, denoised.positions().shape)
 
     with watching(show):
         generate(prior, ["a person jumps"])
@@ -30,8 +30,8 @@ Array = NDArray[np.float64]
 class Denoised:
     """What one network call predicted."""
 
-    done: int
-    """Moves of this walk so far, from 1."""
+    move: int
+    """Number of the move in its walk, from 1."""
     of: int
     """Moves of the walk; an edit of several stretches, or a batch of several lengths, takes several walks."""
     rows: tuple[int, ...]
@@ -51,7 +51,7 @@ class Denoised:
 
 
 OnDenoised = Callable[[Denoised], None]
-SHOWN = 64
+MOST_SEGMENTS = 64
 """Segments of a long motion that are shown while it is sampled."""
 _callback: ContextVar[OnDenoised | None] = ContextVar("motionloom_on_denoised", default=None)
 
@@ -83,16 +83,16 @@ class View:
     def report_walk(self, walk: Iterator[Snapshot], of: int, rows: Sequence[int]) -> Iterator[Snapshot]:
         """The snapshots of a walk of ``of`` moves, each reported before it is handed on; rows: their numbers."""
         motions = [row // self.people for row in rows[:: self.people]]
-        for done, snapshot in enumerate(walk, start=1):
-            report(done, of, motions, lambda snapshot=snapshot: self.poses(snapshot.clean), begin=self.begin)
+        for move, snapshot in enumerate(walk, start=1):
+            report(move, of, motions, lambda snapshot=snapshot: self.poses(snapshot.clean), begin=self.begin)
             yield snapshot
 
 
-def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray], *, begin: float = 0.0) -> None:
+def report(move: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray], *, begin: float = 0.0) -> None:
     """Report one network call to whoever watches; nothing happens where nobody does."""
     callback = _callback.get()
     if callback is not None:
-        callback(Denoised(done, of, tuple(rows), decode, begin))
+        callback(Denoised(move, of, tuple(rows), decode, begin))
 
 
 R = TypeVar("R")
@@ -115,7 +115,7 @@ class ChainView(Generic[R]):
 class LatestEstimates(Generic[R]):
     """The newest prediction for each segment of a long motion.
 
-    It is stored only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
+    It is stored only where somebody watches, for the newest `MOST_SEGMENTS` segments; so memory stays bounded.
     """
 
     def __init__(self, view: ChainView[R], steps: int) -> None:
@@ -132,7 +132,7 @@ class LatestEstimates(Generic[R]):
         for number, row, state, level in zip(numbers, rows, states, at, strict=True):
             self.parts[number] = self.view.part(row, state, level)
         self.calls.update(numbers)
-        for old in sorted(self.parts)[:-SHOWN]:
+        for old in sorted(self.parts)[:-MOST_SEGMENTS]:
             del self.parts[old], self.calls[old]
         for motion in sorted({self._motion(number) for number in numbers}):
             own = sorted(number for number in self.parts if self._motion(number) == motion)

@@ -14,18 +14,18 @@ from motionloom.weights.prior import Card
 from tests.recorded.graphs import PREDICTORS
 from tests.recorded.tiny_predictor import network
 
-KEPT, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
+FREQUENCIES, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
 
 
 def tiny_predictor() -> Predictor:
     """Random weights that move a person a little: half a second seen, two seconds made."""
-    zeros = np.zeros((KEPT, 66), np.float32)
+    zeros = np.zeros((FREQUENCIES, 66), np.float32)
     pose = np.stack([np.zeros(66, np.float32), np.ones(66, np.float32)])
     return Predictor(
         network(PREDICTORS["larger"], 3),
         linear(100),
         SMPL_LAYOUT,
-        Dct(FRAMES, KEPT),
+        Dct(FRAMES, FREQUENCIES),
         OBSERVED,
         FPS,
         "masked",
@@ -43,7 +43,7 @@ def larger() -> Skeleton:
 CLIPS = {"past.bvh", "kick.bvh", "other.bvh"}
 
 
-def written(place: str = ".") -> set[str]:
+def file_names(place: str = ".") -> set[str]:
     return {path.name for path in Path(place).iterdir()} - CLIPS
 
 

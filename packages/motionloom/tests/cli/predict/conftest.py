@@ -31,53 +31,53 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
+def call(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the commands asked of the tasks, which make simple motions and stop where they are told."""
-    seen: dict = {"stop": None, "problem": KeyboardInterrupt}
+    record: dict = {"stop": None, "problem": KeyboardInterrupt}
 
     def predict(predictor, past, *, sampling, seconds, hold, root, foot_lock, progress):
-        seen.update(past=past, count=sampling.count, seconds=seconds, seed=sampling.seed, hold=hold, root=root)
+        record.update(past=past, count=sampling.count, seconds=seconds, seed=sampling.seed, hold=hold, root=root)
         walk = {"steps": sampling.steps, "temperature": sampling.temperature}
-        seen.update(foot_lock=foot_lock, walk=walk, guidance=sampling.guidance)
+        record.update(foot_lock=foot_lock, walk=walk, guidance=sampling.guidance)
         progress(1, 1)
         return [stream.joined([past, future(past, seconds, i)]) for i in sampling.numbers()]
 
     def predict_pieces(
         predictor, past, *, seconds, number, count, seed, hold, guidance, best_of, root, foot_lock, **walk
     ):
-        seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, foot_lock=foot_lock, walk=walk)
-        if (number, -1) == seen["stop"]:
-            raise seen["problem"]
+        record.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, foot_lock=foot_lock, walk=walk)
+        if (number, -1) == record["stop"]:
+            raise record["problem"]
         yield past
         whole = future(past, seconds, number)
         for piece, at in enumerate(range(0, len(whole), 300)):
-            if (number, piece) == seen["stop"]:
-                raise seen["problem"]
+            if (number, piece) == record["stop"]:
+                raise record["problem"]
             yield whole.frames(at, at + 300)
 
     def switch(predictor, past, target, *, sampling, seconds, facing, foot_lock):
-        seen.update(past=past, target=target, count=sampling.count, seconds=seconds, facing=facing)
-        seen["walk"] = {"temperature": sampling.temperature}
+        record.update(past=past, target=target, count=sampling.count, seconds=seconds, facing=facing)
+        record["walk"] = {"temperature": sampling.temperature}
         still = [replace(one, translations=None) for one in (past, target)]
         return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in sampling.numbers()]
 
-    for made in (predict, predict_pieces, switch):
-        monkeypatch.setattr(task, made.__name__, made)
+    for task_function in (predict, predict_pieces, switch):
+        monkeypatch.setattr(task, task_function.__name__, task_function)
     monkeypatch.setattr("motionloom.cli.predict.predict_pieces", predict_pieces)  # opened at its top
-    return seen
+    return record
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list:
+def overlays(monkeypatch: pytest.MonkeyPatch) -> list:
     """What was drawn over each other, instead of the slow drawing."""
     from motionloom.viz import overlay
 
-    seen: list = []
+    record: list = []
 
     def draw_futures(past, futures, path, *, caption, lead):
-        seen.append((past, futures, path.name, caption))
+        record.append((past, futures, path.name, caption))
         path.write_bytes(b"drawn")
         return path
 
     monkeypatch.setattr(overlay, "draw_futures", draw_futures)
-    return seen
+    return record

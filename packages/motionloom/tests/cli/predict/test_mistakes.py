@@ -7,7 +7,7 @@ import pytest
 from motionloom.cli import main
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.weights.prior import save_prior
-from tests.cli.predict.clips import written
+from tests.cli.predict.clips import file_names
 from tests.cli.said import complaint
 from tests.recorded import tiny
 from tests.tasks.test_edit import person
@@ -66,7 +66,7 @@ HOLD = ["--hold", "head", "--from", "kick.bvh"]
     ],
     ids=lambda value: " ".join(value)[:50] if isinstance(value, list) else "",
 )
-def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words, message, capsys):
+def test_mistakes_are_one_sentence_and_nothing_is_written(weights, call, words, message, capsys):
     Path("taken").write_text("mine")
     Path("mask.json").write_text('{"hold": [{"joints": ["head"]}]}')
     Path("bad.json").write_text('{"hold": [{"joints":\n["tail"]}]}')
@@ -77,10 +77,10 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words,
         save_prior(tiny.prior(), "prior.safetensors")
     if "86400" in words:
         save_bvh(person(1.0, 60.0), "past.bvh", unit=0.01)
-    before = written()
+    before = file_names()
     assert main(["predict", *words, *([] if "--weights" in words else ["--weights", weights])]) == 2
     assert message in complaint(capsys)
-    assert (written(), "seconds" in asked) == (before, False)
+    assert (file_names(), "seconds" in call) == (before, False)
 
 
 def test_a_predictor_is_no_prior(weights, capsys):

@@ -6,7 +6,7 @@ from motionloom import io
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
-from tests.cli.predict.clips import run, written
+from tests.cli.predict.clips import file_names, run
 from tests.tasks.test_edit import person, rig
 
 
@@ -19,11 +19,11 @@ def test_a_tiny_network_predicts_on_the_users_own_skeleton(weights, capsys):
     save_bvh(own, "own.bvh", unit=0.01)
     words = ["predict", "own.bvh", "--seconds", "0.5", "--count", "2", "--steps", "2", "--no-picture"]
     assert run(weights, *words, "--hold", "left_arm", "--from", "own.bvh") == 0
-    given, made = io.load("own.bvh"), io.load("futures/future_01.bvh")
-    assert (len(made), made.fps, made.skeleton) == (36, given.fps, given.skeleton)
-    np.testing.assert_allclose(made.positions()[:24], given.positions(), atol=1e-5)
-    elbow = given.skeleton.index("l_elbow")
-    same = np.abs((made.rotations[24:, elbow] * given.rotations[:12, elbow]).sum(-1))
+    past, motion = io.load("own.bvh"), io.load("futures/future_01.bvh")
+    assert (len(motion), motion.fps, motion.skeleton) == (36, past.fps, past.skeleton)
+    np.testing.assert_allclose(motion.positions()[:24], past.positions(), atol=1e-5)
+    elbow = past.skeleton.index("l_elbow")
+    same = np.abs((motion.rotations[24:, elbow] * past.rotations[:12, elbow]).sum(-1))
     np.testing.assert_allclose(same, 1, atol=1e-6)
 
 
@@ -32,16 +32,16 @@ def test_a_past_of_nobody_is_one_sentence(weights, capsys):
     save_bvh(Motion(stick, 30.0, np.zeros((20, 3)), np.tile([1.0, 0, 0, 0], (20, 3, 1))), "stick.bvh")
     assert run(weights, "predict", "stick.bvh") == 2
     assert capsys.readouterr().err.count("\n") == 1
-    assert written() == {"stick.bvh"}
+    assert file_names() == {"stick.bvh"}
 
 
 def test_a_tiny_network_goes_on_and_on_and_switches(weights):
     assert run(weights, "predict", "past.bvh", "--horizon", "31", "--count", "1", "--steps", "1", "--out", "a.bvh") == 0
     assert len(io.load("a.bvh")) == 960
     assert run(weights, "switch", "past.bvh", "kick.bvh", "--steps", "1", "--out", "s.npz") == 0
-    made, past, kick = io.load("s.npz"), io.load("past.bvh"), io.load("kick.bvh")
-    assert len(made) == 30 + 30 + 45
-    np.testing.assert_allclose(made.positions()[:30], past.positions(), atol=1e-6)
-    for motion in (made, kick):
+    whole, past, kick = io.load("s.npz"), io.load("past.bvh"), io.load("kick.bvh")
+    assert len(whole) == 30 + 30 + 45
+    np.testing.assert_allclose(whole.positions()[:30], past.positions(), atol=1e-6)
+    for motion in (whole, kick):
         assert motion.skeleton == past.skeleton
-    np.testing.assert_allclose(np.abs((made.rotations[60:, 1:] * kick.rotations[:, 1:]).sum(-1)), 1, atol=1e-6)
+    np.testing.assert_allclose(np.abs((whole.rotations[60:, 1:] * kick.rotations[:, 1:]).sum(-1)), 1, atol=1e-6)

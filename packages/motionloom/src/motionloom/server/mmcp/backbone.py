@@ -25,7 +25,7 @@ log = logging.getLogger("motionloom.server")
 
 
 class MotionloomBackbone(Backbone):
-    """Requests drawn by the server's one worker, in their turn."""
+    """Requests sampled by the server's one worker, in their turn."""
 
     model_id = MODEL
 
@@ -61,18 +61,18 @@ class MotionloomBackbone(Backbone):
         return self.spec
 
     async def generate(self, request: GenerateRequest) -> MotionResult:
-        """Draw; raises `ProtocolError` with the library's sentence."""
+        """Answer a request; raises `ProtocolError` with the library's sentence."""
         from motionloom.server.mmcp.drawing import Answer, answer
 
-        found: list[Answer] = []
+        answers: list[Answer] = []
 
         def call(models: Any, progress: Callable[[int, int], None]) -> Iterator[Any]:
-            found.extend(answer(models, request, progress))
+            answers.extend(answer(models, request, progress))
             return iter(())
 
-        asked = JobRequest("generate", None, Sampling(count=1), call=call)
+        order = JobRequest("generate", None, Sampling(count=1), call=call)
         try:
-            job = self.worker.submit(asked, "mmcp")
+            job = self.worker.submit(order, "mmcp")
         except Refusal as refusal:
             code = "rate_limited" if refusal.status == 429 else "resource_exhausted"
             raise ProtocolError(code, refusal.sentence) from None
@@ -86,15 +86,15 @@ class MotionloomBackbone(Backbone):
             raise ProtocolError(
                 "invalid_request" if mistake else "internal_error", job.error or "the job was cancelled"
             )
-        (made,) = found
+        (result,) = answers
         return MotionResult(
-            rotations=made.rotations.astype(np.float32),
-            root_translations=made.root.astype(np.float32),
-            translations=None if made.translations is None else made.translations.astype(np.float32),
-            trajectories=[None] * len(made.root) if made.root.shape[1] == 1 else None,  # a pose goes nowhere
-            chunk_boundaries=made.boundaries,
-            canonical_to_request=made.names or None,
-            notes=made.notes,
+            rotations=result.rotations.astype(np.float32),
+            root_translations=result.root.astype(np.float32),
+            translations=None if result.translations is None else result.translations.astype(np.float32),
+            trajectories=[None] * len(result.root) if result.root.shape[1] == 1 else None,  # a pose goes nowhere
+            chunk_boundaries=result.boundaries,
+            canonical_to_request=result.names or None,
+            notes=result.notes,
         )
 
 

@@ -1,4 +1,4 @@
-"""An MMCP request drawn: segments and constraints to motions on the client's skeleton."""
+"""The answer to an MMCP request: segments and constraints to motions on the client's skeleton."""
 
 import secrets
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +18,7 @@ from motionloom.kinematics.feet import planted_feet
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.requests.tasks import Compose, Edit, Generate
-from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
+from motionloom.server.mmcp.constraints import Clock, Goals, as_goal, read_constraints, standing_as, whole_path
 from motionloom.server.mmcp.rigs import Rig, read_rig
 from motionloom.tasks.run import Models, Plan, run, run_each
 from motionloom.tasks.splice import concatenate, ground_pose_at, move_on_floor
@@ -28,13 +28,13 @@ Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 TRANSITION = 1.0
-"""Seconds that two segments share where a request does not say."""
+"""Seconds that two segments share where a request gives none."""
 POSE_SECONDS = 2.0
 """Length of the motion that a single pose is taken from; it is its middle."""
 VARIED = 0.75
 """How far a performance may be from the motion that it is like: the ``strength`` of `edit`."""
 SEAM = 0.4
-"""Seconds before and after the seam with a motion that is like another, which are drawn anew."""
+"""Seconds before and after the seam with a motion that is like another, which are sampled anew."""
 NEAR = 0.6
 """Metres from a foot within which a point of the ground is under it."""
 
@@ -55,17 +55,17 @@ class Answer:
 
 
 def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]:
-    """Draw a `motionmcp.GenerateRequest`; one answer with all of its samples."""
+    """Answer a `motionmcp.GenerateRequest`; one answer with all of its samples."""
     rig = read_rig([joint.model_dump() for joint in request.skeleton.joints])
     clock = Clock(request.total_frames, request.fps(FPS))
-    asked = read_constraints(request.constraints, rig, clock)
+    goals = read_constraints(request.constraints, rig, clock)
     options = request.options
     seed, count = (options.seed, options.num_samples) if options else (None, 1)
     seed = secrets.randbelow(2**31) if seed is None else abs(seed) % 2**61
     motions = []
     for number in range(count):
-        drawn = _sample(models, request, rig, clock, asked, seed + number)
-        motions.append(rig.put(clock.resampled(drawn)))
+        motion = _sample(models, request, rig, clock, goals, seed + number)
+        motions.append(rig.from_person(clock.resampled(motion)))
         progress(number + 1, count)
     places = [rig.places_of(motion) for motion in motions]
     free = [one for one in places if one is not None]
@@ -75,7 +75,7 @@ def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]
         np.stack(free) if len(free) == count else None,
         [_request_ends(request)[:-1]] * count,
         {} if rig.uniform else rig.joints(),
-        list(asked.notes),
+        list(goals.notes),
     )
 
 
@@ -86,15 +86,15 @@ def _request_ends(request: Any) -> list[int]:
 
 @dataclass(frozen=True)
 class _Sampler:
-    """Draws by the library's own requests, through the one `run`."""
+    """Samples by the library's own requests, through the one `run`."""
 
     models: Models
     sampling: Sampling
 
     def run(self, plan: Plan, seed: int) -> Motion:
         """The one motion of a plan."""
-        [made] = run(replace(plan, sampling=replace(self.sampling, seed=seed)), self.models)
-        return made.people[0]
+        [result] = run(replace(plan, sampling=replace(self.sampling, seed=seed)), self.models)
+        return result.people[0]
 
     def compose(self, segments: Sequence[Segment], seed: int, path: Goal | None = None) -> Motion:
         """Segments, one after the other."""
@@ -103,12 +103,12 @@ class _Sampler:
         return self.run(Plan(task="compose", values=values, sampling=self.sampling, timeline=timeline), seed)
 
     def edit(self, values: Edit, seed: int) -> Motion:
-        """A motion changed as a request without words says."""
+        """A motion changed by a request without words."""
         people = (values.motion,)
         return self.run(Plan(task="edit", values=values, sampling=self.sampling, people=people), seed)
 
 
-def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, seed: int) -> Motion:
+def _sample(models: Models, request: Any, rig: Rig, clock: Clock, goals: Goals, seed: int) -> Motion:
     """One motion of the uniform person at 20 per second."""
     kinds = {segment.type for segment in request.segments}
     sampler = _Sampler(models, _sampling(request))
@@ -120,35 +120,35 @@ def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, 
         )
     if "motion_reference" in kinds:
         motion = _like(sampler, request, rig, clock, seed)
-        goal = _posed(asked.goal, asked, motion)
+        goal = _posed(goals.goal, goals, motion)
         motion = motion if goal.empty else fit(motion, goal)
     else:
         segments = _segments(request, clock)
-        motion = _generated(sampler, segments, asked, seed)
+        motion = _generated(sampler, segments, goals, seed)
     if request.options and request.options.loop:
         motion = _looped(sampler, motion, seed)
-    return motion if asked.ground is None else on_ground(motion, asked.ground)
+    return motion if goals.ground is None else on_ground(motion, goals.ground)
 
 
 def _sampling(request: Any) -> Sampling:
-    """One motion, with the steps and guidance that the request says."""
-    found: dict[str, Any] = {}
+    """One motion, with the steps and guidance of the request."""
+    settings: dict[str, Any] = {}
     if request.options is not None and "diffusion_steps" in request.options.model_fields_set:
-        found["steps"] = request.options.diffusion_steps
+        settings["steps"] = request.options.diffusion_steps
     if request.options is not None and request.options.guidance is not None:
-        found["guidance"] = request.options.guidance.weight[0] if request.options.guidance.weight else 1.0
-    return Sampling(count=1, **found)
+        settings["guidance"] = request.options.guidance.weight[0] if request.options.guidance.weight else 1.0
+    return Sampling(count=1, **settings)
 
 
 def _segments(request: Any, clock: Clock) -> list[Segment]:
-    """Segments at 20 frames per second whose frames add up to those that are drawn."""
+    """Segments at 20 frames per second whose frames add up to those that are sampled."""
     listed = request.segments or [None]
     ends = [clock.sampled_frames] if request.segments == [] else _ends(request, clock)
     frames = np.diff([0, *ends]).tolist()
-    wanted = TRANSITION
+    transition = TRANSITION
     if request.options is not None and "transition_frames" in request.options.model_fields_set:
-        wanted = max(request.options.transition_frames / clock.fps, 2 / FPS)
-    shared = [min(wanted, min(a, b) / FPS / 2) for a, b in zip(frames, [*frames[1:], frames[-1]], strict=True)]
+        transition = max(request.options.transition_frames / clock.fps, 2 / FPS)
+    shared = [min(transition, min(a, b) / FPS / 2) for a, b in zip(frames, [*frames[1:], frames[-1]], strict=True)]
     if min(frames) < 4:
         raise MotionloomError(f"a segment of {min(frames) / FPS:g} s is too short; 0.2 s is the least")
     return [
@@ -161,11 +161,11 @@ def _ends(request: Any, clock: Clock) -> list[int]:
     return [*map(clock.frame, _request_ends(request)[:-1]), clock.sampled_frames]
 
 
-def _generated(sampler: _Sampler, segments: list[Segment], asked: Asked, seed: int) -> Motion:
-    """The segments, steered to what is asked of them; poses without a place are asked where a first sample is."""
-    goal = asked.goal
-    if asked.floating:
-        goal = _posed(goal, asked, _steered(sampler, segments, goal, seed))
+def _generated(sampler: _Sampler, segments: list[Segment], goals: Goals, seed: int) -> Motion:
+    """The segments, steered to their constraints; poses without a place are placed where a first sample is."""
+    goal = goals.goal
+    if goals.floating:
+        goal = _posed(goal, goals, _steered(sampler, segments, goal, seed))
     return _steered(sampler, segments, goal, seed)
 
 
@@ -182,10 +182,10 @@ def _steered(sampler: _Sampler, segments: list[Segment], goal: Goal, seed: int) 
     return fit(sampler.compose(segments, seed), goal)
 
 
-def _posed(goal: Goal, asked: Asked, motion: Motion) -> Goal:
-    """The goal, and the poses that say no place of their own where ``motion`` stands then."""
+def _posed(goal: Goal, goals: Goals, motion: Motion) -> Goal:
+    """The goal, and the poses without a place of their own where ``motion`` is then."""
     places = motion.positions()
-    for pose in asked.floating:
+    for pose in goals.floating:
         other = as_goal(standing_as(pose, places[pose.frame]), len(goal))
         positions = np.where(goal.mask, goal.positions, other.positions)
         goal = replace(goal, positions=positions, mask=goal.mask | other.mask)
@@ -203,13 +203,13 @@ def _poses(sampler: _Sampler, request: Any, seed: int) -> Motion:
         )
         for number, segment in enumerate(request.segments)
     ]
-    made = [result.people[0] for _, result in run_each(plans, sampler.models)]
-    middle = [motion.frames(len(motion) // 2, len(motion) // 2 + 1) for motion in made]
+    clips = [result.people[0] for _, result in run_each(plans, sampler.models)]
+    middle = [motion.frames(len(motion) // 2, len(motion) // 2 + 1) for motion in clips]
     return concatenate(*middle, *[middle[-1]] * 4)  # the clock takes as many as it needs
 
 
 def _like(sampler: _Sampler, request: Any, rig: Rig, clock: Clock, seed: int) -> Motion:
-    """Segments of which some are said by a motion: each drawn by itself and put behind the one before."""
+    """Segments of which some are given by a motion: each sampled by itself and placed behind the one before."""
     whole: Motion | None = None
     begins = [0, *_ends(request, clock)]
     for number, (segment, begin, end) in enumerate(zip(request.segments, begins, begins[1:], strict=False)):
@@ -264,7 +264,7 @@ def on_ground(motion: Motion, ground: Array) -> Motion:
     """The motion over a ground of points (x, z, height): planted feet stand on the point under them.
 
     The body rises and sinks with the feet that stand, in between evenly; the legs are fitted to what is left. A foot
-    that no point is under (`NEAR`) is in the air, and nothing is asked of it.
+    that no point is under (`NEAR`) is in the air and has no goal.
     """
     positions = motion.positions()
     planted = planted_feet(positions, motion.fps)

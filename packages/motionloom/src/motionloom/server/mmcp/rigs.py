@@ -64,7 +64,7 @@ class Rig:
         """The uniform person who moves as somebody on this skeleton."""
         return motion if self.uniform else to_smpl22(motion)
 
-    def put(self, motion: Motion) -> Motion:
+    def from_person(self, motion: Motion) -> Motion:
         """The uniform person's motion on this skeleton."""
         return motion if self.uniform else retarget(motion, self.skeleton)
 

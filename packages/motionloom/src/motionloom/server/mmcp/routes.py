@@ -1,4 +1,4 @@
-"""Where MMCP is answered: under ``/mmcp``, and ``POST /generate`` at the root, as its clients ask."""
+"""The routes of MMCP: all under ``/mmcp``, and ``POST /generate`` at the root, where its clients call it."""
 
 import json
 from importlib.util import find_spec
@@ -12,7 +12,7 @@ MISSING = "this server does not speak MMCP: install it with pip install 'motionl
 
 
 class _Forwarded:
-    """Hands a request to the SDK's application, which is made when it is first asked."""
+    """Hands a request to the SDK's application, which is created for the first one."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         inner = application_of(scope["app"])
@@ -27,8 +27,7 @@ class _Forwarded:
 
 def routes() -> list[BaseRoute]:
     """Routes for the server's application."""
-    found: list[BaseRoute] = [Route("/generate", _Forwarded(), methods=["POST"]), Mount("/mmcp", _Forwarded())]
-    return found
+    return [Route("/generate", _Forwarded(), methods=["POST"]), Mount("/mmcp", _Forwarded())]
 
 
 def application_of(app: Starlette) -> Any:

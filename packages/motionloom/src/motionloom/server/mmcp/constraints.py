@@ -1,4 +1,4 @@
-"""What an MMCP request asks, as goals and segments of the library: frames to seconds, one body to another."""
+"""The constraints of an MMCP request as goals of the library: frames to seconds, one body to another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Clock:
-    """Frames of a request, and those at 20 per second that they are drawn as."""
+    """Frames of a request, and those at 20 per second that they are sampled as."""
 
     frames: int
     fps: float
@@ -29,12 +29,12 @@ class Clock:
         """Frames at 20 per second that reach from the request's first to its last."""
         return max(int(np.ceil((self.frames - 1) / self.fps * FPS - 1e-6)) + 1, 4)
 
-    def frame(self, asked: int) -> int:
-        """The drawn frame nearest to one of the request's."""
-        return min(round(asked / self.fps * FPS), self.sampled_frames - 1)
+    def frame(self, number: int) -> int:
+        """The sampled frame nearest to one of the request's."""
+        return min(round(number / self.fps * FPS), self.sampled_frames - 1)
 
     def resampled(self, motion: Motion) -> Motion:
-        """A drawn motion at the request's frames."""
+        """A sampled motion at the request's frames."""
         return motion.at(np.arange(self.frames) / self.fps * FPS, self.fps)
 
 
@@ -45,26 +45,26 @@ class Keyframe:
     frame: int
     places: Array
     """(22, 3) metres; in the world if it is ``placed``."""
-    asked: NDArray[np.bool_]
-    """(22,) joints that are asked."""
+    mask: NDArray[np.bool_]
+    """(22,) joints that are constrained."""
     placed: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Goals:
     """The constraints of a request."""
 
     goal: Goal
-    """Paths, targets and poses that say where they are."""
+    """Paths, targets and poses with a place."""
     floating: tuple[Keyframe, ...]
-    """Poses that do not say where they are: they are asked where the person is at that time."""
+    """Poses without a place: they are constrained to where the person is at that time."""
     ground: Array | None
     """(points, 3) x, z and height."""
     notes: tuple[dict[str, str], ...]
 
 
-def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Asked:
-    """Constraints of `motionmcp.schemas`; raises `MotionloomError` for what contradicts itself or cannot be reached."""
+def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Goals:
+    """Goals of `motionmcp.schemas`; raises `MotionloomError` for what contradicts itself or cannot be reached."""
     size, nearest = rig.size, {joint: name for name, joint in rig.joints().items()}
     goal, floating, ground, notes = Goal.nothing(clock.sampled_frames), [], [], []
     for one in constraints:
@@ -83,7 +83,7 @@ def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Aske
                 floating.append(pose)
         else:
             ground += [(x / size, z / size, y / size) for x, z, y in one.points]
-    return Asked(goal, tuple(floating), np.array(ground) if ground else None, tuple(notes))
+    return Goals(goal, tuple(floating), np.array(ground) if ground else None, tuple(notes))
 
 
 def _path(one: Any, size: float, clock: Clock) -> Goal:
@@ -98,9 +98,9 @@ def _path(one: Any, size: float, clock: Clock) -> Goal:
 
 
 def _unique(frames: Sequence[int], values: Sequence[Any]) -> tuple[list[int], list[Any]]:
-    """One value for each drawn frame: the last of those that fall on it."""
-    found = dict(zip(frames, values, strict=True))
-    return sorted(found), [found[frame] for frame in sorted(found)]
+    """One value for each sampled frame: the last of those that fall on it."""
+    last = dict(zip(frames, values, strict=True))
+    return sorted(last), [last[frame] for frame in sorted(last)]
 
 
 def _target(one: Any, nearest: dict[str, str], size: float, clock: Clock) -> Goal:
@@ -127,20 +127,20 @@ def _pose(one: Any, rig: Rig, size: float, clock: Clock) -> Keyframe:
     root = np.asarray(one.root_position if placed else rig.skeleton.offsets[0], dtype=np.float64)[None]
     person = rig.person(rig.motion(names, turns, root, FPS))
     places = person.positions()[0]
-    if placed:  # the uniform person is where the client's root was asked, in its own size
-        high = float(rig.joints()["pelvis"] == rig.skeleton.names[0])  # a root on the ground says nothing of the height
+    if placed:  # the uniform person is where the client's root is, in its own size
+        high = float(rig.joints()["pelvis"] == rig.skeleton.names[0])  # a root on the ground has no height of its own
         places = places + (root[0] / size - person.root[0]) * np.array([1.0, high, 1.0])
     known = np.ones(len(SMPL22), dtype=bool) if one.fill_mode == "rest" else _known(names, rig)
     return Keyframe(clock.frame(one.frame), places, known, placed)
 
 
 def _known(names: Sequence[str], rig: Rig) -> NDArray[np.bool_]:
-    """(22,) joints whose place the rotations say: all joints above them that turn on this skeleton are given."""
-    given, skeleton, said = set(names), rig.skeleton, rig.joints()
+    """(22,) joints whose place follows from the rotations: all joints above them on this skeleton are in ``names``."""
+    skeleton, joints = rig.skeleton, rig.joints()
     result = np.zeros(len(SMPL22), dtype=bool)
     for number, name in enumerate(SMPL22.names):
-        joint = skeleton.parents[skeleton.index(said[name])]
-        while joint >= 0 and skeleton.names[joint] in given:
+        joint = skeleton.parents[skeleton.index(joints[name])]
+        while joint >= 0 and skeleton.names[joint] in names:
             joint = skeleton.parents[joint]
         result[number] = joint < 0
     return result
@@ -150,20 +150,19 @@ def as_goal(pose: Keyframe, frames: int) -> Goal:
     """A pose in the world as a goal of so many frames."""
     goal = Goal.nothing(frames)
     goal.positions[pose.frame] = pose.places
-    goal.mask[pose.frame] = pose.asked[:, None]
+    goal.mask[pose.frame] = pose.mask[:, None]
     return goal
 
 
 def standing_as(pose: Keyframe, person: Array) -> Keyframe:
-    """A pose that does not say where it is, where and as a drawn person (22, 3) stands."""
+    """A pose without a place, where and as a sampled person (22, 3) stands."""
     places = ground_pose(person).to_world(ground_pose(pose.places).from_world(pose.places))
     return replace(pose, places=places, placed=True)
 
 
 def whole_path(goal: Goal) -> Goal:
-    """The goal with a place for the pelvis in every frame: between and around those that are asked, straight on."""
-    asked = goal.mask[:, 0, [0, 2]].all(axis=-1)
-    frames = np.flatnonzero(asked)
+    """The goal with a place for the pelvis in every frame: between and around those that it has, straight on."""
+    frames = np.flatnonzero(goal.mask[:, 0, [0, 2]].all(axis=-1))
     positions, flags = goal.positions.copy(), goal.mask.copy()
     for axis in (0, 2):
         known = goal.positions[frames, 0, axis]
