@@ -7,7 +7,7 @@ save(motions[0], "walk.bvh")
 `compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips; a
 `Predictor` can `predict` what somebody does next, or `switch` from one clip to another. With a `PairBlock` two people
 come into one world: `generate_pair`, `complete_pair`, `react`, `compose_pair`. `Live` and `LivePair`
-move without end and do what is asked meanwhile.
+move without end and follow requests meanwhile.
 """
 
 from importlib import import_module
@@ -116,7 +116,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import the public names when they are asked for: `motionloom --help` needs none of the libraries behind them."""
+    """Import the public names when they are used: `motionloom --help` needs none of the libraries behind them."""
     if name not in _PLACES:
         raise AttributeError(f"module 'motionloom' has no attribute {name!r}")
     return getattr(import_module(f"motionloom.{_PLACES[name]}"), name)

@@ -1,6 +1,6 @@
 """Functions on arrays and on tensors: what sampling and training both need is written once.
 
-Nothing here imports torch: a tensor was made by somebody who has it.
+Nothing here imports torch: whoever has a tensor has imported it.
 """
 
 import sys

@@ -42,7 +42,7 @@ class Format:
     character: str | Callable[..., Any] = ""
     """``(path, joint_map=) -> Character`` of `motionloom.io.character`: a humanoid that is written with its motions."""
     needs: str | Callable[..., Any] = ""
-    """Raises `MotionloomError` where a program that the writer needs is missing; asked before long work."""
+    """Raises `MotionloomError` where a program that the writer needs is missing; called before long work."""
 
 
 FORMATS = {
@@ -63,7 +63,7 @@ def find(path: Path | str) -> Format:
     if suffix and suffix not in FORMATS:
         from importlib.metadata import entry_points
 
-        register(*(point.load() for point in entry_points(group=GROUP, name=suffix[1:])))
+        register(*(one.load() for one in entry_points(group=GROUP, name=suffix[1:])))
     return FORMATS.get(suffix, Format(suffix))
 
 

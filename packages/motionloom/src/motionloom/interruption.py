@@ -1,7 +1,7 @@
 """Ctrl-C and the signals with which schedulers and terminals end a program: all of them end it alike.
 
 Each becomes a `KeyboardInterrupt` in the main thread. Where files are being finished it waits until they are in place
-(`held_back`), so that what was made is kept, whatever the moment; a second signal does not wait.
+(`held_back`), so that what is written is whole, whatever the moment; a second signal does not wait.
 """
 
 import signal

@@ -17,7 +17,7 @@ from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 MAX_POSES = 100_000_000
-"""Frames times joints of the longest motion that is made or read; some 10 GB."""
+"""Frames times joints of the longest motion that is generated or read; some 10 GB."""
 _LEFT_HIP, _RIGHT_HIP, _LEFT_SHOULDER, _RIGHT_SHOULDER = map(
     SMPL22.index, ("left_hip", "right_hip", "left_shoulder", "right_shoulder")
 )
@@ -48,11 +48,12 @@ class Motion:
                 f"a motion of {joints} joints needs root (frames, 3) and rotations (frames, {joints}, 4), at least one "
                 f"frame; got {self.root.shape} and {self.rotations.shape}"
             )
-        if self.translations is not None and self.translations.shape != (frames, joints, 3):
-            raise MotionloomError(f"translations must be ({frames}, {joints}, 3); got {self.translations.shape}")
+        moved = self.translations
+        if moved is not None and moved.shape != (frames, joints, 3):
+            raise MotionloomError(f"translations must be ({frames}, {joints}, 3); got {moved.shape}")
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionloomError(f"the frame rate must be a positive number; got {self.fps}")
-        values = [self.root, self.rotations] + ([] if self.translations is None else [self.translations])
+        values = [self.root, self.rotations] + ([] if moved is None else [moved])
         if not all(np.isfinite(v).all() for v in values):
             raise MotionloomError("the motion has numbers that are not finite (NaN or infinity)")
 

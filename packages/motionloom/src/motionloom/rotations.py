@@ -66,7 +66,7 @@ def quat_to_matrix(q: np.ndarray) -> Array:
 def matrix_to_quat(m: np.ndarray) -> Array:
     """Rotation matrices ``(..., 3, 3)`` to unit quaternions.
 
-    Each of four vectors is the quaternion times four times one of its parts; the longest is made a unit vector
+    Each of four vectors is the quaternion times four times one of its parts; the longest is normalised
     (Markley, "Unit Quaternion from Rotation Matrix", 2008).
     """
     m = np.asarray(m, dtype=np.float64)
@@ -136,7 +136,7 @@ def quat_to_euler(order: str, q: np.ndarray) -> Array:
     first = np.where(low, 2 * total, np.where(high, 2 * rest, total + rest)) * sign
     last = np.where(low | high, 0.0, total - rest)
     angles = np.stack([first, middle - np.pi / 2, last], axis=-1)
-    return angles - 2 * np.pi * ((angles > np.pi).astype(np.float64) - (angles < -np.pi))
+    return angles - 2 * np.pi * (1.0 * (angles > np.pi) - (angles < -np.pi))
 
 
 def shortest_arc(a: np.ndarray, b: np.ndarray) -> Array:

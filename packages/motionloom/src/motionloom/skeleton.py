@@ -226,7 +226,7 @@ def _smpl22() -> Skeleton:
     directions = np.array([row[3:] for row in _ROWS[1:]], dtype=np.float64)
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     offsets = np.concatenate([np.zeros((1, 3)), directions * np.array(HUMANML_BONE_LENGTHS)[:, None]])
-    offsets[0, 1] = -offsets[[1, 4, 7, 10], 1].sum()  # the toes stand on the floor at rest
+    offsets[0, 1] = -offsets[[1, 4, 7, 10], 1].sum()  # the toes are on the floor
     return Skeleton(names, parents, offsets, groups=_SMPL22_GROUPS, on_floor=True)
 
 

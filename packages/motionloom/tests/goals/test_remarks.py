@@ -31,8 +31,8 @@ def test_the_word_that_says_what_is_done(text: str, verb: tuple[str, ...]) -> No
 def test_a_verb_that_nobody_said_needs_nearer_sentences() -> None:
     """Sharing its nouns with what was learned makes no prompt known."""
     assert Nearest("a", (), 0.6, NEAR + 0.01).near
-    assert not Nearest("a", (), 0.6, NEAR + 0.01, heard=False).near
-    assert Nearest("a", (), 0.8, NEAR - 0.1, heard=False).near
+    assert not Nearest("a", (), 0.6, NEAR + 0.01, verb_known=False).near
+    assert Nearest("a", (), 0.8, NEAR - 0.1, verb_known=False).near
 
 
 def test_phrases_that_nobody_looked_at() -> None:

@@ -113,6 +113,14 @@ def test_odd_but_valid_spellings_read_the_same(tmp_path, change):
     np.testing.assert_allclose(odd.positions(), plain.positions(), atol=1e-12)
 
 
+def test_names_that_braces_tell_apart_stay_unique(tmp_path):
+    """Braces become brackets; a second joint of such a name gets its number, as often as that is another joint's."""
+    skeleton = Skeleton(("hips", "a(_3", "a{", "a("), (-1, 0, 0, 0), np.eye(4)[:, :3])
+    motion = Motion(skeleton, 30.0, np.zeros((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 4, 1)))
+    names = load_bvh(save_bvh(motion, tmp_path / "a.bvh"), unit=1.0).skeleton.names
+    assert names == ("hips", "a(_3", "a(", "a(_3_3")
+
+
 @pytest.mark.parametrize(
     "name", ["mixamorig:Hips", "Left Arm", "Bip01 L Thigh", "a.b-c_d", "Hüfte", "腰", "ROOT", "End"]
 )

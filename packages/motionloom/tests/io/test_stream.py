@@ -128,7 +128,7 @@ def test_nothing_stands_at_the_place_until_it_is_closed(tmp_path):
 
 def test_a_full_disk_keeps_the_pieces_that_fitted(tmp_path, monkeypatch):
     """The third piece gets half of itself onto the disk; the file ends after the second."""
-    motion, put = spinning(60), bvh_writer._put
+    motion, put = spinning(60), bvh_writer._write
 
     def full(file, data):
         if len(data) < 1000:
@@ -139,7 +139,7 @@ def test_a_full_disk_keeps_the_pieces_that_fitted(tmp_path, monkeypatch):
     with open_stream(tmp_path / "a.bvh", total=60) as stream:
         stream.write(motion.frames(0, 20))
         stream.write(motion.frames(20, 40))
-        monkeypatch.setattr(bvh_writer, "_put", full)
+        monkeypatch.setattr(bvh_writer, "_write", full)
         with pytest.raises(MotionloomError, match=r"cannot write .*a\.bvh: No space"):
             stream.write(motion.frames(40, 60))
     assert len(io.load(tmp_path / "a.bvh")) == 40

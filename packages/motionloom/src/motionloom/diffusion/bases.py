@@ -1,7 +1,7 @@
 """Where the state lives when it is not frames: its first few frequencies in time.
 
 HumanMAC (Chen et al. 2023, section 3.1) denoises the first L coefficients of the discrete cosine transform of a motion,
-so that a state's tokens are frequencies; what is known about single frames is put in by going to time and back.
+so that a state's tokens are frequencies; what is known about single frames is inserted by going to time and back.
 """
 
 import math
@@ -27,8 +27,8 @@ class Dct:
     @cached_property
     def matrix(self) -> np.ndarray:
         """(kept, frames) float64, orthonormal rows: its transpose is the way back."""
-        k, i = np.arange(self.kept)[:, None], np.arange(self.frames)
-        rows = math.sqrt(2 / self.frames) * np.cos(math.pi * (i + 0.5) * k / self.frames)
+        k, i = np.arange(self.kept)[:, None], np.arange(self.frames) + 0.5
+        rows = math.sqrt(2 / self.frames) * np.cos(math.pi * i * k / self.frames)
         rows[0] = math.sqrt(1 / self.frames)
         return rows
 

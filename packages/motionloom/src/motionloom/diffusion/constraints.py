@@ -1,4 +1,4 @@
-"""Edits of the state, made just after it reached a level.
+"""Edits of the state, just after it reached a level.
 
 observe    holds part of the state to known data at that level's noise
 handshake  makes the end of each row and the beginning of the next the same (long motion)

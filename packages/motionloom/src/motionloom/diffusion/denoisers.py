@@ -50,8 +50,8 @@ def guide(
 
     `net(state, level, condition)` answers the clean data; `cond` and `null` hold one entry per row, with all that
     belongs to rows inside them (also lengths), because the network is shown (conditional rows, unconditional
-    rows). `join` puts two conditions behind each other; it is called once, here. `scale` is a number or an array
-    (rows,), or either as a function of the level. Where every scale is 1 only the conditional pass is made, where
+    rows). `join` puts one condition behind another; it is called once, here. `scale` is a number or an array
+    (rows,), or either as a function of the level. Where every scale is 1 only the conditional pass is run, where
     every scale is 0 only the unconditional one; a row with scale 0 or 1 gets exactly that pass's answer beside any
     other rows.
     """
@@ -69,9 +69,9 @@ def guide(
     def guided(x: State, level: int) -> State:
         if len(scales) not in (1, len(x)):
             raise ValueError(f"there are {len(scales)} guidance scales for {len(x)} rows: give one, or one per row")
-        conditional, unconditional = np.split(net(np.concatenate([x, x]), level, both), 2)
+        conditional, plain = np.split(net(np.concatenate([x, x]), level, both), 2)
         s = scales.astype(x.dtype).reshape((-1,) + (1,) * (x.ndim - 1))
-        return lerp(unconditional, conditional, s)
+        return lerp(plain, conditional, s)
 
     return guided
 

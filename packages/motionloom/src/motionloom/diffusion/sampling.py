@@ -28,7 +28,7 @@ class Snapshot(NamedTuple):
     """The level that was reached."""
     state: State
     clean: State
-    """The denoised estimate that the move was made with."""
+    """The denoised estimate of the move."""
 
 
 def sample(

@@ -125,10 +125,10 @@ def sigmoid(steps: int) -> Schedule:
     return _from_signal("sigmoid", steps, lambda u: logistic(3) - logistic(6 * u - 3))
 
 
-def _from_signal(name: str, steps: int, kept: Callable[[float], float]) -> Schedule:
-    """The schedule whose share of signal at time u in [0, 1] is proportional to ``kept(u)``."""
+def _from_signal(name: str, steps: int, share: Callable[[float], float]) -> Schedule:
+    """The schedule whose share of signal at time u in [0, 1] is proportional to ``share(u)``."""
     _check_steps(steps)
-    return from_betas(name, [min(max(1 - kept((i + 1) / steps) / kept(i / steps), 0.0), 0.999) for i in range(steps)])
+    return from_betas(name, [min(max(1 - share((i + 1) / steps) / share(i / steps), 0.0), 0.999) for i in range(steps)])
 
 
 def linear(steps: int) -> Schedule:
@@ -148,7 +148,7 @@ def levels(schedule: Schedule, steps: int, *, spacing: str = "index") -> list[in
     """A walk of `steps` moves from the noisiest level T down to 0: `steps + 1` strictly falling levels.
 
     "index": evenly spaced levels ("trailing" in diffusers; it starts at T, as Lin et al. 2024 recommend).
-    "early": levels T (1 - (i / steps)²), denser near pure noise, where it is decided what will be shown.
+    "early": levels T (1 - (i / steps)²), denser near pure noise, where the motion is decided.
     "quadratic": evenly spaced roots of the level (Song et al. 2021, D.3), denser near clean data. On normal data of
     narrow and wide spread alike it keeps the spread best in 10 to 50 moves of DPM-Solver++(2M) on the cosine schedule.
     "snr": evenly spaced in log(signal / noise) from T to 1, then 0 (the spacing of the DPM-Solver paper).
@@ -157,17 +157,17 @@ def levels(schedule: Schedule, steps: int, *, spacing: str = "index") -> list[in
     if not 1 <= steps <= top:
         raise ValueError(f"cannot take {steps} steps over {top} levels: ask for 1 to {top}")
     if spacing == "index":
-        wanted = [top * (steps - i) / steps for i in range(steps)]
+        goals = [top * (steps - i) / steps for i in range(steps)]
     elif spacing == "early":
-        wanted = [top * (1 - (i / steps) ** 2) for i in range(steps)]
+        goals = [top * (1 - (i / steps) ** 2) for i in range(steps)]
     elif spacing == "quadratic":
-        wanted = [top * ((steps - i) / steps) ** 2 for i in range(steps)]
+        goals = [top * ((steps - i) / steps) ** 2 for i in range(steps)]
     elif spacing == "snr":
-        wanted = _even_in_log_snr(schedule, steps)
+        goals = _even_in_log_snr(schedule, steps)
     else:
         raise ValueError(f"no spacing {spacing!r}; there are {', '.join(SPACINGS)}")
     result = [top]
-    for i, level in enumerate(wanted[1:], start=1):
+    for i, level in enumerate(goals[1:], start=1):
         # stay below the last level, and leave one level for every step that is still to come
         result.append(max(min(round(level), result[-1] - 1), steps - i))
     return [*result, 0]

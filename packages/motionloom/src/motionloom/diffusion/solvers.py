@@ -77,8 +77,8 @@ class Ddim:
         """The three factors of one move."""
         (a_t, b_t), (a_s, b_s) = schedule.at(t), schedule.at(s)
         r = _decay(schedule, t, s)
-        kept = b_s * math.sqrt(1.0 - self.eta**2 + (self.eta * r) ** 2) / b_t
-        return Move(a_s - kept * a_t, kept, self.eta * b_s * math.sqrt(1.0 - r * r))
+        factor = b_s * math.sqrt(1.0 - self.eta**2 + (self.eta * r) ** 2) / b_t
+        return Move(a_s - factor * a_t, factor, self.eta * b_s * math.sqrt(1.0 - r * r))
 
     def start(self, schedule: Schedule) -> Step:
         """See `Solver.start`."""

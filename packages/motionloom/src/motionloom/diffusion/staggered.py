@@ -39,14 +39,14 @@ class _Row:
     step: Step
     generator: np.random.Generator
     state: State
-    done: int = 0
-    """Moves made."""
+    moves: int = 0
+    """Moves so far."""
     sampled: dict[int, State] = field(default_factory=dict)
     """The row's own noise by the move it is for (0: the start), as long as it or the next row needs it."""
     draws: int = 0
 
     def noise(self, move: int, features: int) -> State:
-        """(length, features) sampled in order, so that the noise of a move does not depend on who asks first."""
+        """(length, features) sampled in order, so that the noise of a move does not depend on who needs it first."""
         while self.draws <= move:
             self.sampled[self.draws] = self.generator.standard_normal((self.link.length, features), np.float32)
             self.draws += 1
@@ -54,10 +54,10 @@ class _Row:
 
     def moved(self) -> None:
         """One move more; of the noise up to it the next row needs the overlap, of what lies further back nothing."""
-        self.done += 1
-        for old in [move for move in self.sampled if move <= self.done]:
+        self.moves += 1
+        for old in [move for move in self.sampled if move <= self.moves]:
             used = self.sampled.pop(old)
-            if old >= self.done - 1:
+            if old >= self.moves - 1:
                 self.sampled[old] = used[-max(self.link.overlap, 1) :].copy()
 
 
@@ -79,8 +79,8 @@ def staggered(
     """Clean rows (length, features) in order, overlaps included twice; the copies of an overlap are equal.
 
     ``links`` is read as the walk gets there. ``batch_size``: rows per network call at most. ``moved`` is called with
-    how many rows made a move. Raises ValueError where the overlaps of
-    a row do not fit into it, and for levels that do not fall.
+    how many rows moved. Raises ValueError where the overlaps of a row do not fit into it, and for levels that do not
+    fall.
     """
     if len(levels) < 2 or any(s >= t for t, s in pairwise(levels)) or batch_size < 1:
         raise ValueError(f"a walk needs falling levels and a row per call, got {list(levels)} and {batch_size} rows")
@@ -111,13 +111,13 @@ class _Chain:
         while self.rows:
             if ready := self._ready():
                 self._move(ready)
-            while first in self.rows and self.rows[first].done == last and self._neighbour_done(first, last):
+            while first in self.rows and self.rows[first].moves == last and self._neighbour_done(first, last):
                 yield self.rows.pop(first).state
                 first += 1
 
     def _neighbour_done(self, number: int, last: int) -> bool:
         following = self.rows.get(number + 1)
-        return following.done == last if following else self.ended
+        return following.moves == last if following else self.ended
 
     def _admit(self) -> bool:
         """Take the next row of the chain, if there is one."""
@@ -146,25 +146,25 @@ class _Chain:
 
     def _ready(self) -> list[int]:
         """The first rows whose neighbours are as far as they are."""
-        found: list[int] = []
+        ready: list[int] = []
         number, most = min(self.rows), self.batch_size
-        while len(found) < most and (number in self.rows or (number == max(self.rows) + 1 and self._admit())):
+        while len(ready) < most and (number in self.rows or (number == max(self.rows) + 1 and self._admit())):
             row = self.rows[number]
             if number + 1 not in self.rows:
                 self._admit()
             near = (self.rows.get(number - 1), self.rows.get(number + 1))
-            if row.done < len(self.levels) - 1 and all(one is None or one.done >= row.done for one in near):
-                found.append(number)
+            if row.moves < len(self.levels) - 1 and all(one is None or one.moves >= row.moves for one in near):
+                ready.append(number)
             number += 1
-        return found
+        return ready
 
     def _move(self, numbers: Sequence[int]) -> None:
         rows = [self.rows[number] for number in numbers]
-        at = [self.levels[row.done] for row in rows]
+        at = [self.levels[row.moves] for row in rows]
         cleans = self.denoise(numbers, [row.state for row in rows], at)
         for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
-            noise = self._noise_of(number, row.done + 1)
-            row.state = row.step(row.state, clean, level, self.levels[row.done + 1], noise)
+            noise = self._noise_of(number, row.moves + 1)
+            row.state = row.step(row.state, clean, level, self.levels[row.moves + 1], noise)
             row.moved()
         for number in numbers:
             self._shake(number - 1, number)
@@ -175,7 +175,7 @@ class _Chain:
     def _shake(self, left: int, right: int) -> None:
         """Make the copies of an overlap equal, if both rows are there and equally far."""
         a, b = self.rows.get(left), self.rows.get(right)
-        if a is None or b is None or a.done != b.done or not a.link.overlap:
+        if a is None or b is None or a.moves != b.moves or not a.link.overlap:
             return
         h = a.link.overlap
         weight = (np.arange(h, dtype=a.state.dtype) / h)[:, None]

@@ -1,7 +1,7 @@
 """The BABEL representation: a person as 135 numbers per frame at 30 fps, and back.
 
 Root height, planar root velocity, and the rotations of the 22 body joints: what the BABEL models of PriorMDM (Shafir et
-al. 2024, after TEACH, Athanasiou et al. 2022) see and make. The numbers live in AMASS's world: metres, **+Z up**. A
+al. 2024, after TEACH, Athanasiou et al. 2022) read and write. The numbers live in AMASS's world: metres, **+Z up**. A
 `Motion` lives in this project's: +Y up. One point is (x, y, z) there and (x, z, -y) here; rotations of joints 1..21 are
 relative to their parents and the same in both.
 

@@ -66,12 +66,12 @@ OFFSETS: Array = REST_DIRECTIONS * np.array([0.0, *HUMANML_BONE_LENGTHS])[:, Non
 
 
 def uniform(positions: np.ndarray) -> Array:
-    """Put a motion of anybody on the uniform person: (frames, 22, 3) to the same, metres.
+    """Fit a motion of anybody to the uniform person: (frames, 22, 3) to the same, metres.
 
     The root path is scaled by the ratio of the leg lengths (thigh and shin of frame 0), every bone keeps its direction
     and takes the uniform one's length. (The published inverse and forward kinematics amount to that exactly.)
     """
-    positions = _checked(positions)
+    positions = checked(positions)
     bones = positions[:, 1:] - positions[:, _PARENTS[1:]]
     lengths = np.linalg.norm(OFFSETS, axis=-1)
     # the published code measures the legs by the largest coordinate of the rest offset, which lies on one axis
@@ -92,7 +92,7 @@ def canonical(positions: np.ndarray) -> Array:
     The lowest joint of all frames gets y = 0, the root of frame 0 x = z = 0; frame 0 faces along up x (left to right
     hip + left to right shoulder).
     """
-    positions = _checked(positions)
+    positions = checked(positions)
     positions = positions - [0, positions[..., 1].min(), 0]
     positions = positions - positions[0, 0] * [1, 0, 1]
     turn = rot.shortest_arc(_facing(positions[:1], swapped_hips=False), _FORWARD)
@@ -132,7 +132,7 @@ def rotations6d(positions: np.ndarray, heading: np.ndarray) -> Array:
 
 
 def contacts(positions: np.ndarray) -> Array:
-    """(frames - 1, 4): 1 where a joint of `FEET` moves less than 4.5 cm to the next frame; height is not asked."""
+    """(frames - 1, 4): 1 where a joint of `FEET` moves less than 4.5 cm to the next frame; height does not matter."""
     moved = np.diff(positions[:, list(FEET)], axis=0)
     return ((moved**2).sum(-1) < CONTACT_THRESHOLD).astype(np.float64)
 
@@ -142,7 +142,7 @@ def encode(positions: np.ndarray, *, heading: Heading = "compatible") -> NDArray
 
     With ``corrected`` the smoothed facing of frame 0 need not be +Z; decoding gives the motion turned so that it is.
     """
-    positions = _checked(positions)
+    positions = checked(positions)
     if len(positions) < 2:
         raise MotionloomError("features need at least 2 frames of positions; got 1")
     turn = heading_quaternions(positions, heading=heading)
@@ -184,7 +184,7 @@ def resample_positions(positions: np.ndarray, fps: float, *, target: float = FPS
 
     Straight lines would shorten the arcs of limbs in every frame that falls between two of the source.
     """
-    x = _checked(positions)
+    x = checked(positions)
     if not (np.isfinite(fps) and fps > 0):
         raise MotionloomError(f"the frame rate must be a positive number; got {fps}")
     if fps == target or len(x) == 1:
@@ -293,7 +293,8 @@ def mirror(features: np.ndarray) -> NDArray[np.float32]:
 # Parts
 
 
-def _checked(positions: np.ndarray) -> Array:
+def checked(positions: np.ndarray) -> Array:
+    """Positions (frames, 22, 3); raises `MotionloomError` for another shape and numbers that are not finite."""
     positions = np.asarray(positions, dtype=np.float64)
     if positions.ndim != 3 or positions.shape[1:] != (22, 3) or len(positions) == 0:
         raise MotionloomError(f"positions must be (frames, 22, 3) with at least one frame; got {positions.shape}")

@@ -98,13 +98,14 @@ def encode(positions: np.ndarray, *, heading: Heading = "corrected") -> PairMoti
     """
     p = _checked(positions)
     place = SMPL_LAYOUT.place(p[:, 0])
-    poses = np.stack([np.cos(place.facing), np.sin(place.facing), place.origin[:, 0], place.origin[:, 2]], axis=-1)
+    angle, (x, _, z) = place.facing, place.origin.T
+    poses = stack(np.cos(angle), np.sin(angle), x, z)
     local = from_world(p - floors(p)[:, None, None, None] * np.array([0.0, 1.0, 0.0]), poses[:, None, None])
     if heading == "corrected":
-        turn = np.stack([humanml.heading_quaternions(person, heading=heading)[0] for person in local])
+        turn = np.stack([humanml.heading_quaternions(one, heading=heading)[0] for one in local])
         w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
-        poses = compose(poses, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
-    return PairMotion(np.stack([humanml.encode(person, heading=heading) for person in local]), poses)
+        poses = compose(poses, stack(1 - 2 * y * y, -2 * w * y, zero, zero))
+    return PairMotion(np.stack([humanml.encode(one, heading=heading) for one in local]), poses)
 
 
 def decode(features: Numbers, poses: Numbers) -> Numbers:
@@ -134,7 +135,7 @@ def moved_along(features: np.ndarray, way: np.ndarray, change: np.ndarray) -> np
     new = features.copy()
     turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
     new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
-    # velocities are given in the heading of the frame they lead to
+    # velocities are in the heading of the frame after them
     x, z = _back(features[:-1, 1], features[:-1, 2], np.cos(turn), np.sin(turn))
     there = on_the_spot(way[1:], turn)
     more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])
@@ -271,15 +272,13 @@ def one_world(uniform: Sequence[np.ndarray], legs: Sequence[float]) -> Array:
     ``uniform`` are two (frames, 22, 3) whose places are scaled by the uniform legs over each person's own.
     """
     mean = float(np.mean(legs))
-    moved = [
-        p + (leg / mean - 1.0) * p[:, :1] * np.array([1.0, 0.0, 1.0]) for p, leg in zip(uniform, legs, strict=True)
-    ]
-    return np.stack(moved)
+    flat, pairs = np.array([1.0, 0.0, 1.0]), zip(uniform, legs, strict=True)
+    return np.stack([p + (leg / mean - 1.0) * p[:, :1] * flat for p, leg in pairs])
 
 
 def checked(positions: np.ndarray, fps: float, *, name: str) -> Array:
     """(2, frames, 22, 3) at ``fps`` to 20 frames per second with constant bones; raises for no pair, as `together`."""
-    result = np.stack([humanml.uniform(humanml.resample_positions(person, fps)) for person in positions])
+    result = np.stack([humanml.uniform(humanml.resample_positions(one, fps)) for one in positions])
     if result.shape[1] < SHORTEST:
         raise MotionloomError(f"{name}: only {result.shape[1] / FPS:.2f} s long; at least 1 s is needed")
     apart = result[1] - result[0]

@@ -38,7 +38,7 @@ class PlacedMotion:
 
     @cached_property
     def _world(self) -> tuple[Array, Array]:
-        """Places (frames + 1, 22, 3) and facing (frames + 1,); the root of the last one is where the features lead."""
+        """Places (frames + 1, 22, 3) and facing (frames + 1,); the root of the last one is where the features end."""
         features = self.features.astype(np.float64)
         places = humanml.decode_positions(np.concatenate([features, features[-1:]]))
         turns = np.concatenate([[0.0], np.cumsum(features[:, 0])])

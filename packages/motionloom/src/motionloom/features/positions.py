@@ -38,9 +38,9 @@ class Layout:
     def __post_init__(self) -> None:
         n = len(self.names)
         tree = self.parents[:1] == (-1,) and all(0 <= p < j for j, p in enumerate(self.parents[1:], start=1))
-        paired = len(self.pairs) == n and all(0 <= p < n and self.pairs[p] == j for j, p in enumerate(self.pairs))
+        pairs = len(self.pairs) == n and all(0 <= p < n and self.pairs[p] == j for j, p in enumerate(self.pairs))
         sides = all(len(pair) == 2 and all(0 <= j < n for j in pair) for pair in self.across)
-        if not (2 <= n <= MAX_JOINTS and len(self.parents) == n and tree and paired and sides):
+        if not (2 <= n <= MAX_JOINTS and len(self.parents) == n and tree and pairs and sides):
             raise MotionloomError(f"the layout of {n} joints is not usable; parents, pairs and names must fit together")
         if self.z_up and self.across:
             raise MotionloomError("a layout is turned to the person's facing with +Y up only")

@@ -44,44 +44,44 @@ def load(
     """
     path = Path(path)
     options = {"fps": fps, "unit": unit, "asf": asf, "clip": clip}
-    found = _checked(path, fps, unit=unit, asf=asf)
-    if clip is not None and not found.clips:
+    kind = _checked(path, fps, unit=unit, asf=asf)
+    if clip is not None and not kind.clips:
         raise MotionloomError(f"{path} holds one motion; a clip is chosen in {', '.join(formats.with_clips())} files")
-    own = {name: options[name] for name in found.options if options.get(name) is not None}
-    motion = _call(found.reader, path, **own)
+    own = {key: options[key] for key in kind.options if options.get(key) is not None}
+    motion = _call(kind.reader, path, **own)
     motion = motion if fps is None or "fps" in own else replace(motion, fps=fps)
     return motion if unit is None or "unit" in own else motion.scaled(unit)
 
 
 def _checked(path: Path, fps: float | None, *, unit: float | None, asf: Path | str | None) -> Format:
     """The format of a file that may be read, with options that may go with it."""
-    found = formats.find(path)
-    suffix = found.suffix
+    kind = formats.find(path)
+    suffix = kind.suffix
     if path.is_dir():
         raise MotionloomError(f"{path} is a folder; name a file in it")
     if suffix == ".asf":
         raise MotionloomError(f"{path} is a skeleton without a motion; name the .amc file instead")
-    if not found.reader:
+    if not kind.reader:
         hint = f"; {_WAYS_IN[suffix]}" if suffix in _WAYS_IN else f"; it ends in {suffix or 'none'}"
         raise MotionloomError(f"{path} cannot be read: its name must end in {', '.join(formats.readable())}{hint}")
     if fps is not None and not 1e-3 <= fps <= 1e5:
         raise MotionloomError(f"the frame rate must be a number from 0.001 to 100000; got {fps:g}")
     if unit is not None and not 1e-9 < unit < 1e9:
         raise MotionloomError(f"the unit must be a positive number of metres; got {unit:g}")
-    if unit is not None and found.metres:
+    if unit is not None and kind.metres:
         raise MotionloomError(f"{path} is in metres by its format; a unit is for BVH, ASF and glTF files")
-    if asf is not None and "asf" not in found.options:
+    if asf is not None and "asf" not in kind.options:
         raise MotionloomError(f"{path} has its own skeleton; an ASF file is for AMC files")
-    return found
+    return kind
 
 
 def open_character(path: Path | str, *, joint_map: Any = None) -> Any:
     """The `Character` of a file; ``joint_map``: which joints are which. Raises `MotionloomError` if it holds none."""
     path = Path(path)
-    found = formats.find(path)
-    if not found.character:
+    kind = formats.find(path)
+    if not kind.character:
         raise MotionloomError(f"{path} is no character; one ends in {', '.join(formats.characters())}")
-    return _call(found.character, path, joint_map=joint_map)
+    return _call(kind.character, path, joint_map=joint_map)
 
 
 def check_output(path: Path | str, *, own: str | None = None) -> Path:
@@ -90,9 +90,9 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
     ``own`` is a further suffix that may be written, that of a character's own file.
     """
     path = Path(path)
-    found = formats.find(path)
-    suffix = found.suffix
-    if not found.writer and suffix != own and not path.is_dir():
+    kind = formats.find(path)
+    suffix = kind.suffix
+    if not kind.writer and suffix != own and not path.is_dir():
         hint = f"; {_WAYS_OUT[suffix]}" if suffix in _WAYS_OUT else f"; it ends in {suffix or 'none'}"
         raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(formats.writable())}{hint}")
     check_place(path)
@@ -115,14 +115,14 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
     """
     path = check_output(path)
     several = [motions] if isinstance(motions, Motion) else list(motions)
-    found = formats.find(path)
-    _check_count(several, found, path)
-    labels = {"captions": captions} if found.labels == "captions" else {}
-    return _call(found.writer, several[0] if found.single else several, path, **labels)
+    kind = formats.find(path)
+    _check_count(several, kind, path)
+    labels = {"captions": captions} if kind.labels == "captions" else {}
+    return _call(kind.writer, several[0] if kind.single else several, path, **labels)
 
 
-def _check_count(motions: Sequence[Motion], found: Format, path: Path) -> None:
-    if not motions or (len(motions) > 1 and found.single):
+def _check_count(motions: Sequence[Motion], kind: Format, path: Path) -> None:
+    if not motions or (len(motions) > 1 and kind.single):
         raise MotionloomError(f"{path} holds one motion; got {len(motions)}, so give each its own file or write a .glb")
 
 
@@ -135,8 +135,8 @@ def save_scene(
 ) -> Path:
     """Write people who share one world frame as one scene: GLB, USDA, or one MP4, GIF, PNG or HTML with all of them.
 
-    ``names``, one per person, name them in a GLB or USDA and in a picture's legend; ``captions``, one per person, stand
-    over pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
+    ``names``, one per person, name them in a GLB or USDA and in a picture's legend; ``captions``, one per person, are
+    written over pictures and films (one only where all are the same). `save` would draw the same people side by side.
     BVH and NPZ files hold one person. The file appears whole or not at all.
     Raises `MotionloomError` for names or captions of another count, another suffix, or a place that cannot be written.
     """
@@ -144,20 +144,20 @@ def save_scene(
     for what, texts in (("names", names), ("captions", captions)):
         if texts is not None and len(texts) != len(motions):
             raise MotionloomError(f"{len(motions)} motions need as many {what}; got {len(texts)}")
-    found = formats.find(path)
-    _check_count(motions, found, path)
-    if found.single or not found.labels:
+    kind = formats.find(path)
+    _check_count(motions, kind, path)
+    if kind.single or not kind.labels:
         return save(motions, path)
-    if found.labels == "names":
-        return _call(found.writer, motions, path, names=names)
+    if kind.labels == "names":
+        return _call(kind.writer, motions, path, names=names)
     title = "   |   ".join(dict.fromkeys(c for c in captions or () if c))
-    if found.scene:
-        return _call(found.scene, motions, path, caption=title)
+    if kind.scene:
+        return _call(kind.scene, motions, path, caption=title)
     from motionloom.viz.overlay import draw_scene, tint
     from motionloom.viz.scene import Actor
 
-    labels = names if names is not None else [""] * len(motions)
-    actors = [Actor(m, tint(i), label=label) for i, (m, label) in enumerate(zip(motions, labels))]
+    texts = [""] * len(motions) if names is None else names
+    actors = [Actor(m, tint(i), label=text) for i, (m, text) in enumerate(zip(motions, texts))]
     return draw_scene(actors, path, caption=title)
 
 
@@ -167,12 +167,12 @@ def load_scene(path: Path | str) -> list[Motion]:
     Raises `MotionloomError` as `load` does; `load` itself gives a GLB's first person.
     """
     path = Path(path)
-    found = _checked(path, None, unit=None, asf=None)
-    return _call(found.people, path) if found.people else [load(path)]
+    kind = _checked(path, None, unit=None, asf=None)
+    return _call(kind.people, path) if kind.people else [load(path)]
 
 
 def _call(function: str | Callable[..., Any], *values: Any, **options: Any) -> Any:
-    """What a format's function answers."""
+    """The result of a format's function."""
     if not isinstance(function, str):
         return function(*values, **options)
     module, _, name = function.partition(":")

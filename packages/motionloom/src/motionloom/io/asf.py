@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 AMC_FPS = 120.0
 """The rate of CMU's own AMC files; the format has no field for it."""
 MAX_BONES = 10_000
+_DOFS = {"tx", "ty", "tz", "rx", "ry", "rz"}
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,14 @@ def _sections(data: bytes, path: Path | str) -> dict[str, list[Line]]:
 
 
 def _units(lines: list[Line], path: Path | str) -> tuple[float, bool]:
-    found = {words[0].lower(): (number, words) for number, words in lines}
+    fields = {words[0].lower(): (number, words) for number, words in lines}
     length = 1.0
-    if "length" in found:
-        number, words = found["length"]
+    if "length" in fields:
+        number, words = fields["length"]
         length = _numbers(words[1:], 1, (path, number, "length"))[0]
         if not 1e-6 <= length <= 1e6:
             raise MotionloomError(f"{path}, line {number}: the unit of length must be above 0; got {length:g}")
-    angle = found.get("angle", (0, ["angle", "deg"]))[1]
+    angle = fields.get("angle", (0, ["angle", "deg"]))[1]
     return 0.0254 / length, not angle[-1].lower().startswith("rad")
 
 
@@ -136,18 +137,18 @@ def _numbers(words: list[str], count: int, where: tuple[Path | str, int, str]) -
 
 
 def _root(lines: list[Line], path: Path | str, scale: float) -> Bone:
-    found = {words[0].lower(): (number, words[1:]) for number, words in lines}
-    number, dofs = found.get("order", (0, ["TX", "TY", "TZ", "RX", "RY", "RZ"]))
+    fields = {words[0].lower(): (number, words[1:]) for number, words in lines}
+    number, dofs = fields.get("order", (0, ["TX", "TY", "TZ", "RX", "RY", "RZ"]))
     dofs = tuple(w.lower() for w in dofs)
-    if len(set(dofs)) != len(dofs) or not set(dofs) <= {"tx", "ty", "tz", "rx", "ry", "rz"}:
+    if len(set(dofs)) != len(dofs) or not _DOFS.issuperset(dofs):
         raise MotionloomError(
             f"{path}, line {number}: the root's order must name TX TY TZ RX RY RZ; got {text.shown(' '.join(dofs))}"
         )
     values = []
     for key in ("position", "orientation"):
-        number, words = found.get(key, (0, ["0", "0", "0"]))
+        number, words = fields.get(key, (0, ["0", "0", "0"]))
         values.append(np.array(_numbers(words, 3, (path, number, key))))
-    number, words = found.get("axis", (0, ["XYZ"]))
+    number, words = fields.get("axis", (0, ["XYZ"]))
     order = _axis_order(words[-1] if words else "", path, number)
     return Bone("root", tuple(values[0]), tuple(values[1] * scale), order, dofs)
 
@@ -241,43 +242,43 @@ def read_amc(path: Path | str, asf: Asf) -> tuple[dict[str, Array], bool]:
     rows: dict[str, list[bytes]] = {}
     dofs = {b.name.encode(): len(b.dofs) for b in asf.bones if b.dofs}
     degrees, counters, whole = asf.degrees, [], set()
-    seen: set[bytes] = set()
+    bones: set[bytes] = set()
     for line, raw in enumerate(data.split(b"\n"), start=1):
         words = raw.split()
         if not words or words[0][:1] in b"#:":
             if words:
                 degrees = {b":DEGREES": True, b":RADIANS": False}.get(words[0].upper(), degrees)
         elif len(words) == 1 and words[0].isdigit():
-            whole = _close_frame(seen, whole, (path, line, len(counters)))
+            whole = _close_frame(bones, whole, (path, line, len(counters)))
             counters.append(int(words[0][:18]))
-            seen = set()
+            bones = set()
         else:
-            _check_row(words, dofs, seen, where=(path, line, bool(counters)))
-            seen.add(words[0])
+            _check_row(words, dofs, bones, where=(path, line, bool(counters)))
+            bones.add(words[0])
             rows.setdefault(text.word(words[0]), []).extend(words[1:])
-    _close_frame(seen, whole, (path, data.count(b"\n") + 1, len(counters)))
+    _close_frame(bones, whole, (path, data.count(b"\n") + 1, len(counters)))
     _check_counters(counters, path)
     return {name: _values(words, len(counters), data, path=path) for name, words in rows.items()}, degrees
 
 
-def _close_frame(seen: set[bytes], whole: set[bytes], where: tuple[Path | str, int, int]) -> set[bytes]:
+def _close_frame(bones: set[bytes], whole: set[bytes], where: tuple[Path | str, int, int]) -> set[bytes]:
     """Every frame must hold the bones of the first."""
     path, line, frame = where
     if frame == 0:
         return whole
     if frame == 1:
-        whole = seen
-    if not seen:
+        whole = bones
+    if not bones:
         raise MotionloomError(f"{path}, line {line}: frame {frame} is empty; the file is cut off or no AMC file")
-    if seen != whole:
-        odd = min(seen ^ whole)
+    if bones != whole:
+        odd = min(bones ^ whole)
         change = f"frame {frame} {'lacks' if odd in whole else 'adds'} {text.shown(odd)}, unlike the first"
         raise MotionloomError(f"{path}, line {line}: {change}; the file is cut off or damaged")
     return whole
 
 
 def _check_row(
-    words: list[bytes], dofs: dict[bytes, int], seen: set[bytes], *, where: tuple[Path | str, int, bool]
+    words: list[bytes], dofs: dict[bytes, int], bones: set[bytes], *, where: tuple[Path | str, int, bool]
 ) -> None:
     path, line, begun = where
     name = words[0]
@@ -292,7 +293,7 @@ def _check_row(
             else "is no turning bone of the ASF file; do the two belong together?"
         )
         raise MotionloomError(f"{path}, line {line}: {text.shown(name)} with {len(words) - 1} numbers {known}")
-    if name in seen:
+    if name in bones:
         raise MotionloomError(f"{path}, line {line}: {text.shown(name)} appears twice in one frame")
 
 
@@ -339,7 +340,7 @@ def _local(bone: Bone, values: Array | None, scale: float, frames: int) -> Array
 
 
 def _layout(asf: Asf) -> tuple[list[str], list[int], list[int], list[int]]:
-    """Joint names, parents, the bone at whose end each stands (-1: where its parent does), the bone that turns it."""
+    """Joint names, parents, the bone at whose end each is (-1: where its parent is), the bone that turns it."""
     children: list[list[int]] = [[] for _ in asf.bones]
     for bone, parent in enumerate(asf.parents[1:], start=1):
         children[parent].append(bone)
@@ -386,10 +387,10 @@ def _assemble(asf: Asf, values: dict[str, Array], degrees: bool, fps: float, uni
             rotations[:, j] = _local(asf.bones[b], values.get(asf.bones[b].name), scale, frames)
     bone = asf.bones[0]
     root = np.tile(np.array(bone.end), (frames, 1))
-    given = values.get("root")
-    for i, dof in enumerate(bone.dofs if given is not None else ()):
-        if dof[0] == "t" and given is not None:
-            root[:, "xyz".index(dof[1])] += given[:, i]
+    channels = values.get("root")
+    for i, dof in enumerate(bone.dofs):
+        if dof[0] == "t" and channels is not None:
+            root[:, "xyz".index(dof[1])] += channels[:, i]
     return Motion(skeleton, fps, root * unit, rotations)
 
 
@@ -405,5 +406,5 @@ def find_asf(amc: Path | str) -> Path:
                 return path
     if len(beside) == 1:
         return beside[0]
-    found = ", ".join(p.name for p in beside[:5]) or "none"
-    raise MotionloomError(f"no ASF skeleton for {amc} beside it (there: {found}); name it with --asf")
+    names = ", ".join(p.name for p in beside[:5]) or "none"
+    raise MotionloomError(f"no ASF skeleton for {amc} beside it (there: {names}); name it with --asf")

@@ -31,8 +31,8 @@ def finished(folder: Path | str, *patterns: str) -> list[Path]:
     What is hidden, or lies in a hidden folder below, is a part that some process is writing or was killed over.
     """
     folder = Path(folder)
-    found = {path for pattern in patterns for path in folder.glob(pattern)}
-    return sorted(p for p in found if not any(part.startswith(".") for part in p.relative_to(folder).parts))
+    paths = {path for pattern in patterns for path in folder.glob(pattern)}
+    return sorted(p for p in paths if not any(part.startswith(".") for part in p.relative_to(folder).parts))
 
 
 def sweep(folder: Path) -> None:
@@ -114,9 +114,9 @@ def _new_part(folder: Path, suffix: str, *, is_folder: bool) -> tuple[Path, int]
 
 
 def check_place(path: Path | str, *, folders: bool = False) -> Path:
-    """The path (where a link leads, the place it leads to), if a file could be made there.
+    """The path (of a link, what it points to), if a file could be created there.
 
-    folders: its folder and those above it may be missing, if they could be made. Nothing is made.
+    folders: its folder and those above it may be missing, if they could be created. Nothing is created.
     Raises `MotionloomError` if it is a folder or another thing that is no file, its name is impossible, or its folder
     is missing or not writable.
     """
@@ -128,7 +128,7 @@ def check_place(path: Path | str, *, folders: bool = False) -> Path:
             raise MotionloomError(f"cannot write {path}: a pipe, socket or device is there; name a file")
     except FileNotFoundError:
         target = path
-    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: links that lead to each other
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: links that point to each other
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"cannot write {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
@@ -162,21 +162,21 @@ def _nearest(path: Path) -> Path:
 
 @contextmanager
 def with_folders(folder: Path) -> Iterator[None]:
-    """The folder and those above it are there in the block; where it fails, those made for it that are empty go again.
+    """The folder and those above it are there in the block; where it fails, empty ones created for it are removed.
 
-    Raises OSError where one cannot be made.
+    Raises OSError where one cannot be created.
     """
-    made: list[Path] = []
+    folders: list[Path] = []
     try:
         for one in (*reversed(folder.parents), folder):
             with held_back():
                 if not one.is_dir():
                     one.mkdir(exist_ok=True)
-                    made.append(one)
+                    folders.append(one)
         yield
     except BaseException:
         with held_back(), suppress(OSError):
-            for one in reversed(made):
+            for one in reversed(folders):
                 one.rmdir()
         raise
 
@@ -185,8 +185,8 @@ def with_folders(folder: Path) -> Iterator[None]:
 def atomic_path(path: Path | str, *, folders: bool = False) -> Iterator[Path]:
     """Give a fresh path beside ``path`` to write to, and move it into place when the block ends well.
 
-    The temporary name keeps the suffix. On any error the temporary file goes and what stood at ``path`` stays.
-    folders: folders that are missing are made, and go again on any error.
+    The temporary name keeps the suffix. On any error the temporary file goes and what was at ``path`` stays.
+    folders: folders that are missing are created, and removed again on any error.
     Raises `MotionloomError` if ``path`` is a folder, or lies in a folder that is missing or cannot be written.
     """
     target = check_place(path, folders=folders)
@@ -196,6 +196,8 @@ def atomic_path(path: Path | str, *, folders: bool = False) -> Iterator[Path]:
             yield temporary
             os.replace(temporary, target)
     except OSError as error:
-        if error.filename in (str(temporary), None) or temporary is None:  # such as a full disk: name what was asked
+        if (
+            error.filename in (str(temporary), None) or temporary is None
+        ):  # such as a full disk: name the path of the call
             raise MotionloomError(f"cannot write {path}: {error.strerror or error}") from error
         raise

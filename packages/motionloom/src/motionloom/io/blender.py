@@ -28,7 +28,7 @@ _CHOSEN: ContextVar[Path | None] = ContextVar("blender", default=None)
 _SCRIPT = """
 import sys
 import bpy
-source, made, fps = sys.argv[-3], sys.argv[-2], float(sys.argv[-1])
+source, target, fps = sys.argv[-3], sys.argv[-2], float(sys.argv[-1])
 bpy.ops.wm.read_factory_settings(use_empty=True)
 scene = bpy.context.scene
 if fps:
@@ -37,14 +37,14 @@ if source.lower().endswith(".fbx"):
     bpy.ops.import_scene.fbx(filepath=source)
     for action in bpy.data.actions:
         action.name = action.name.split("|")[-1]
-    bpy.ops.export_scene.gltf(filepath=made, export_format="GLB", export_animations=True, export_yup=True,
+    bpy.ops.export_scene.gltf(filepath=target, export_format="GLB", export_animations=True, export_yup=True,
                               export_frame_range=False, export_force_sampling=True,
                               export_optimize_animation_size=False)
 else:
     bpy.ops.import_scene.gltf(filepath=source)
     ends = [a.frame_range[1] for a in bpy.data.actions] or [1]
     scene.frame_start, scene.frame_end = 0, max(1, round(max(ends)))
-    bpy.ops.export_scene.fbx(filepath=made, object_types={"ARMATURE", "MESH", "EMPTY"}, add_leaf_bones=False,
+    bpy.ops.export_scene.fbx(filepath=target, object_types={"ARMATURE", "MESH", "EMPTY"}, add_leaf_bones=False,
                              bake_anim=True, bake_anim_use_nla_strips=False, bake_anim_use_all_actions=True,
                              bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0,
                              apply_scale_options="FBX_SCALE_ALL", path_mode="COPY", embed_textures=True)
@@ -72,8 +72,7 @@ def find_blender() -> list[str]:
         if place is None:
             raise MotionloomError(f"there is no program {chosen}; --blender names Blender, or a Python with bpy")
         return _command(place)
-    place = shutil.which("blender")
-    if place is not None:
+    if (place := shutil.which("blender")) is not None:
         return _command(place)
     if importlib.util.find_spec("bpy") is not None:
         return [sys.executable]
@@ -84,8 +83,7 @@ def find_blender() -> list[str]:
 
 
 def _command(place: str) -> list[str]:
-    python = Path(place).name.lower().find("python") >= 0
-    if python:
+    if "python" in Path(place).name.lower():
         return [place]
     return [place, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
 
@@ -94,9 +92,9 @@ def fbx_to_glb(source: Path, folder: Path) -> Path:
     """The GLB in ``folder`` that Blender makes of an FBX; raises `MotionloomError` where it makes none."""
     if not source.is_file():
         raise MotionloomError(f"there is no file {source}")
-    made = folder / f"{source.stem}.glb"
-    _convert(source, made, fps=0.0)
-    return made
+    glb = folder / f"{source.stem}.glb"
+    _convert(source, glb, fps=0.0)
+    return glb
 
 
 def glb_to_fbx(source: Path, path: Path, *, fps: float) -> Path:
@@ -106,15 +104,15 @@ def glb_to_fbx(source: Path, path: Path, *, fps: float) -> Path:
     return path
 
 
-def _convert(source: Path, made: Path, *, fps: float) -> None:
+def _convert(source: Path, target: Path, *, fps: float) -> None:
     command = find_blender()
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "convert.py"
         script.write_text(_SCRIPT, encoding="utf-8")
         words = [*command, str(script), *(("--",) if len(command) > 1 else ())]
         try:
-            ended = subprocess.run(
-                [*words, str(source.resolve()), str(made.resolve()), repr(fps)],
+            run = subprocess.run(
+                [*words, str(source.resolve()), str(target.resolve()), repr(fps)],
                 check=False,
                 capture_output=True,
                 text=True,
@@ -126,8 +124,8 @@ def _convert(source: Path, made: Path, *, fps: float) -> None:
             raise MotionloomError(f"Blender took more than {SECONDS:.0f} s for {source}; convert it by hand") from None
         except OSError as error:
             raise MotionloomError(f"{command[0]} cannot be run: {error.strerror or error}") from None
-    if ended.returncode or not made.is_file() or not made.stat().st_size:
-        output = ended.stdout + ended.stderr
+    if run.returncode or not target.is_file() or not target.stat().st_size:
+        output = run.stdout + run.stderr
         lines = [line for line in output.splitlines() if "rror" in line]
-        said = one_line(lines[-1])[:200] if lines else f"it ended with {ended.returncode}"
-        raise MotionloomError(f"Blender could not convert {source}: {said}")
+        line = one_line(lines[-1])[:200] if lines else f"it ended with {run.returncode}"
+        raise MotionloomError(f"Blender could not convert {source}: {line}")

@@ -85,11 +85,11 @@ def _bone(motion: Motion, shape: Figure, world: Array, i: int) -> Piece | None:
     piece = _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), radii)
     below = motion.skeleton.children(child)
     foot = set(below) <= motion.skeleton.ends and set(shape.hips[:-1]) & set(motion.skeleton.ancestors(parent))
-    return _with_sole(piece, shape, world, child) if piece is not None and foot else piece
+    return _with_sole(piece, shape, world, child) if piece and foot else piece
 
 
 def _with_sole(piece: Piece, shape: Figure, world: Array, toe: int) -> Piece:
-    """A piece of a foot made flat where it would be in the floor while its ``toe`` stands there."""
+    """A piece of a foot flattened where it would be in the floor while its ``toe`` stands there."""
     standing = shape.contacts[:, toe]
     if not standing.any():
         return piece
@@ -182,17 +182,16 @@ def _loft(joint: int, side: int, ends: Array, radii: Array, *, across: Array | N
 
 def _stitch(rings: int) -> NDArray[np.int64]:
     """Triangles of a pole, rings of `SIDES` vertices, and a pole."""
-    around = np.arange(SIDES)
-    after = (around + 1) % SIDES
+    ring = np.arange(SIDES)
+    after = (ring + 1) % SIDES
     last = 1 + rings * SIDES
-    faces = [np.stack([np.zeros_like(around), 1 + after, 1 + around], axis=-1)]
-    for ring in range(rings - 1):
-        a, b = 1 + ring * SIDES, 1 + (ring + 1) * SIDES
-        faces.append(np.stack([a + around, a + after, b + after], axis=-1))
-        faces.append(np.stack([a + around, b + after, b + around], axis=-1))
+    faces = [(np.zeros_like(ring), 1 + after, 1 + ring)]
+    for a in range(1, last - SIDES, SIDES):
+        b = a + SIDES
+        faces += [(a + ring, a + after, b + after), (a + ring, b + after, b + ring)]
     top = last - SIDES
-    faces.append(np.stack([top + around, top + after, np.full_like(around, last)], axis=-1))
-    return np.concatenate(faces)
+    faces.append((top + ring, top + after, np.full_like(ring, last)))
+    return np.concatenate([np.stack(face, axis=-1) for face in faces])
 
 
 def _normals(points: Array, triangles: NDArray[np.int64]) -> Array:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import text
-from motionloom.io.bvh_writer import SAME_PLACE, end_name, is_tip, moving_offsets, save_bvh
+from motionloom.io.bvh_writer import SAME_PLACE, is_tip, moving_offsets, save_bvh
 from motionloom.motion import Motion
 from motionloom.skeleton import Poses, Skeleton
 
@@ -91,9 +91,9 @@ class _Words:
         ]
         self.at = 0
 
-    def next(self, wanted: str) -> str:
+    def next(self, what: str) -> str:
         if self.at >= len(self.words):
-            raise MotionloomError(f"{self.path}: the hierarchy ends where {wanted} should follow")
+            raise MotionloomError(f"{self.path}: the hierarchy ends where {what} should follow")
         self.at += 1
         return self.words[self.at - 1][0]
 
@@ -114,14 +114,14 @@ class _Words:
         return " ".join(parts)
 
     def numbers(self, count: int, what: str) -> tuple[float, ...]:
-        found = []
+        values = []
         for _ in range(count):
             word = self.next(f"{count} numbers of {what}")
             value = text.number(word)
             if value is None:
                 raise self.fail(f"{what} needs {count} finite numbers below 1e9; {text.shown(word)} is none")
-            found.append(value)
-        return tuple(found)
+            values.append(value)
+        return tuple(values)
 
 
 def _hierarchy(data: bytes, path: Path | str) -> list[_Joint]:
@@ -171,37 +171,37 @@ def _open_joint(words: _Words, key: str, joints: list[_Joint], open_joints: list
 
 def _check_joints(joints: list[_Joint], path: Path | str) -> None:
     """Unique names, an OFFSET each; End Sites get their names here, when all others are known."""
-    taken: set[str] = set()
+    names: set[str] = set()
     for joint in joints:
-        if not joint.end and joint.name in taken:
+        if not joint.end and joint.name in names:
             raise MotionloomError(
                 f"{path}, line {joint.line}: a second joint is called {text.shown(joint.name)}; rename one"
             )
         if joint.offset is None and not joint.end:
             raise MotionloomError(f"{path}, line {joint.line}: the joint {text.shown(joint.name)} has no OFFSET")
-        taken |= set() if joint.end else {joint.name}
+        names |= set() if joint.end else {joint.name}
     copies: dict[str, int] = {}
     for joint in joints:
         if joint.end:
-            base = joint.name = end_name(joints[joint.parent].name)
-            while joint.name in taken:
+            base = joint.name = f"{joints[joint.parent].name} End Site"
+            while joint.name in names:
                 copies[base] = copies.get(base, 1) + 1
                 joint.name = f"{base} {copies[base]}"
-            taken.add(joint.name)
+            names.add(joint.name)
 
 
 def _without_empty_ends(joints: list[_Joint]) -> list[_Joint]:
     """The joints without End Sites at no distance, and without those that `is_tip` knows."""
     alone = Counter(j.parent for j in joints)
-    kept = []
+    numbers = []
     for i, joint in enumerate(joints):
         end, offset = joint.offset or (), joints[joint.parent].offset or (0.0, 0.0, 0.0)
-        says_nothing = not any(end) or (alone[joint.parent] == 1 and is_tip(offset, end))
-        kept += [] if joint.end and says_nothing else [i]
-    place = {old: new for new, old in enumerate(kept)} | {-1: -1}
-    for i in kept:
+        empty = not any(end) or (alone[joint.parent] == 1 and is_tip(offset, end))
+        numbers += [] if joint.end and empty else [i]
+    place = {old: new for new, old in enumerate(numbers)} | {-1: -1}
+    for i in numbers:
         joints[i].parent = place[joints[i].parent]
-    return [joints[i] for i in kept]
+    return [joints[i] for i in numbers]
 
 
 def _describe(words: _Words, key: str, joint: _Joint) -> None:
@@ -295,9 +295,8 @@ class _Reader:
                 if kind == "position":
                     self.places[here, k, "XYZ".index(axis)] = values[:, self.columns[j] + at]
         self.rotations[here] = rot.IDENTITY
-        for order, members in self.orders.items():
-            angles = np.radians(values[:, [columns for _, columns in members]])
-            self.rotations[here, [j for j, _ in members]] = rot.euler_to_quat(order, angles)
+        for order, (members, columns) in self.orders.items():
+            self.rotations[here, members] = rot.euler_to_quat(order, np.radians(values[:, columns]))
 
 
 def frame_rate(seconds: str) -> float | None:
@@ -310,8 +309,8 @@ def frame_rate(seconds: str) -> float | None:
     if value is None or not 1e-6 <= value <= 1e4:
         return None
     digit = 10.0 ** max(int(Decimal(seconds).as_tuple().exponent), -300)  # of an exponent of any number of digits
-    for rates, apart in ((_RATES, 0.012), (_BROADCAST, 0.012), ((max(round(1 / value), 1),), 1e-4)):
-        near = [r for r in rates if abs(1 / r - value) < digit and abs(r * value - 1) < apart]
+    for rates, off in ((_RATES, 0.012), (_BROADCAST, 0.012), ((max(round(1 / value), 1),), 1e-4)):
+        near = [r for r in rates if abs(1 / r - value) < digit and abs(r * value - 1) < off]
         if near:
             return float(min(near, key=lambda r: abs(r * value - 1)))
     return 1 / value
@@ -322,10 +321,10 @@ def _complain(data: bytes, start: int, count: int, columns: int, *, path: Path |
     while start < len(data):
         stop = data.find(b"\n", start)
         stop = len(data) if stop < 0 else stop
-        found = len(data[start:stop].split())
-        rows += found > 0
-        if found not in (0, columns):
-            raise MotionloomError(f"{path}, line {line}: {found} numbers where the hierarchy has {columns} channels")
+        width = len(data[start:stop].split())
+        rows += width > 0
+        if width not in (0, columns):
+            raise MotionloomError(f"{path}, line {line}: {width} numbers where the hierarchy has {columns} channels")
         start, line = stop + 1, line + 1
     raise MotionloomError(f"{path} says {count} frames but holds {rows}; it was cut off or its Frames line is wrong")
 
@@ -357,8 +356,9 @@ def _assemble(frames: _Reader, fps: float, unit: float | None) -> Bvh:
     names = tuple(joint.name for joint in joints)
     ends = frozenset(i for i, joint in enumerate(joints) if joint.end)
     skeleton = Skeleton(names, parents, offsets * scale, ends, poses=poses)
-    orders = {joints[j].name: order for order, members in frames.orders.items() for j, _ in members}
-    return Bvh(Motion(skeleton, fps, root, frames.rotations, translations), scale, orders)
+    orders = {joints[j].name: order for order, (members, _) in frames.orders.items() for j in members}
+    motion = Motion(skeleton, fps, root, frames.rotations, translations)
+    return Bvh(motion, scale, orders)
 
 
 def _columns(joints: list[_Joint]) -> list[int]:
@@ -366,13 +366,16 @@ def _columns(joints: list[_Joint]) -> list[int]:
     return list(np.cumsum([0, *(len(j.channels) for j in joints[:-1])]))
 
 
-def _orders(joints: list[_Joint]) -> dict[str, list[tuple[int, list[int]]]]:
+def _orders(joints: list[_Joint]) -> dict[str, tuple[list[int], list[list[int]]]]:
     """For each order of rotation channels the joints that have it, and the columns of their angles."""
-    groups: dict[str, list[tuple[int, list[int]]]] = {}
+    groups: dict[str, tuple[list[int], list[list[int]]]] = {}
     for j, (joint, column) in enumerate(zip(joints, _columns(joints))):
         turns = [(c[0], column + at) for at, c in enumerate(joint.channels) if c.endswith("rotation")]
         if turns:
-            groups.setdefault("".join(axis for axis, _ in turns), []).append((j, [at for _, at in turns]))
+            order = "".join(axis for axis, _ in turns)
+            members, columns = groups.setdefault(order, ([], []))
+            members.append(j)
+            columns.append([at for _, at in turns])
     return groups
 
 
@@ -398,7 +401,7 @@ def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:
     more for millimetres, and anything else for centimetres. Wrong for a doll, a giant or a lone hand: say the unit.
     Bones above the first joint that branches (a reference joint, metres from the body) do not count.
     """
-    only_child = np.bincount(np.array(parents[1:], dtype=int), minlength=len(parents)) == 1
+    only_child = np.bincount(np.array(parents[1:], int), minlength=len(parents)) == 1
     first = int(np.argmin(only_child)) if only_child[0] else 0  # children follow at once as long as nothing branches
     first = first if first in parents else 0
     reach = np.zeros(len(parents))

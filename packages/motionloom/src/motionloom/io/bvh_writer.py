@@ -30,11 +30,6 @@ _ROWS = 4096  # rows formatted at once
 _INDENT = 40  # deeper levels are not indented further: the file would grow with the square of the depth
 
 
-def end_name(parent: str) -> str:
-    """The name of a joint's End Site."""
-    return f"{parent} End Site"
-
-
 def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str] = "ZXY", unit: float = 1.0) -> Path:
     """Write a motion as BVH and give the path back.
 
@@ -51,7 +46,7 @@ def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str]
 
 
 class GrowingBvh:
-    """A BVH file that is written as the motion is made, in memory that does not grow with its length.
+    """A BVH file that is written as the motion is generated, in memory that does not grow with its length.
 
     The hierarchy is written at once, frames as they come, and their number at the end, in the place kept for it.
     Angles go on without jumps from one piece to the next. After an error or an interruption `finish` still leaves a
@@ -90,24 +85,24 @@ class GrowingBvh:
         self.places = len(str(frames)) if frames else 12
         lines = self._hierarchy(skeleton, sequence, offsets)
         seconds = format(1 / first.fps, ".8f" if 0.01 < first.fps < 1000 else ".12g")
-        self.count_at = _put(file, "\n".join([*lines, "MOTION", "Frames: "]).encode())
-        self.end = self.count_at + _put(file, f"{0:>{self.places}}\nFrame Time: {seconds}\n".encode())
+        self.count_at = _write(file, "\n".join([*lines, "MOTION", "Frames: "]).encode())
+        self.end = self.count_at + _write(file, f"{0:>{self.places}}\nFrame Time: {seconds}\n".encode())
 
     def write(self, piece: Motion) -> None:
         """Add frames; each `_ROWS` of them count once they are on the disk."""
         if len(str(self.frames + len(piece))) > self.places:
             raise MotionloomError(f"more frames came than were announced; no number above {'9' * self.places} fits")
-        self.file.seek(self.end)  # what an earlier failure left half written is written over
+        self.file.seek(self.end)  # over what an earlier failure left half written
         for start in range(0, len(piece), _ROWS):
             block = self._block(piece.frames(start, start + _ROWS))
-            self.end += _put(self.file, "".join(self.row % tuple(values) for values in block.tolist()).encode())
+            self.end += _write(self.file, "".join(self.row % tuple(values) for values in block.tolist()).encode())
             self.frames += len(block)
 
     def finish(self) -> None:
         """Drop what was not written whole, and say how many frames there are."""
         self.file.truncate(self.end)
         self.file.seek(self.count_at)
-        _put(self.file, f"{self.frames:>{self.places}}".encode())
+        _write(self.file, f"{self.frames:>{self.places}}".encode())
 
     def _block(self, motion: Motion) -> Array:
         """(rows, channels): the numbers of some frames as they are in the file."""
@@ -120,7 +115,7 @@ class GrowingBvh:
                 columns.append(motion.translations[:, joint] / self.unit)
             name = self.orders[joint]
             columns.append(degrees[name][:, self.angles[name].at[joint]])
-        return np.round(np.concatenate(columns, axis=1), 6) + 0.0  # + 0.0: no minus zero
+        return np.round(np.concatenate(columns, axis=1), 6) + 0.0  # no minus zero
 
     def _hierarchy(self, skeleton: Skeleton, sequence: list[int], offsets: Array) -> list[str]:
         names, parents = _names(skeleton), skeleton.parents
@@ -150,7 +145,7 @@ class GrowingBvh:
         return lines
 
 
-def _put(file: FileIO, data: bytes) -> int:
+def _write(file: FileIO, data: bytes) -> int:
     """Write all of it, however little the system takes at once; gives how much that was."""
     left = memoryview(data)
     while left:
@@ -181,12 +176,13 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
 def _names(skeleton: Skeleton) -> list[str]:
     """Joint names that survive the format: no braces, no line ends, unique."""
     names: list[str] = []
-    taken: set[str] = set()
+    used: set[str] = set()
     for joint, raw in enumerate(skeleton.names):
         name = " ".join(raw.replace("{", "(").replace("}", ")").split()) or f"joint_{joint}"
         name = "".join(c if c.isprintable() else "?" for c in name)
-        name = name if name not in taken else f"{name}_{joint}"
-        taken.add(name)
+        while name in used:
+            name = f"{name}_{joint}"
+        used.add(name)
         names.append(name)
     return names
 
@@ -244,7 +240,7 @@ def tip(offset: Array, *, level: bool) -> Array:
 
 
 def is_tip(offset: Sequence[float], end: Sequence[float]) -> bool:
-    """Whether `tip` made the End Site ``end`` of a joint with this offset."""
+    """Whether the End Site ``end`` of a joint with this offset is that of `tip`."""
     bone, there = np.array(offset, dtype=np.float64), np.array(end, dtype=np.float64)
     return float(np.linalg.norm(bone)) >= SHORTEST and any(
         float(np.abs(tip(bone, level=level) - there).max()) < _SAME for level in (False, True)

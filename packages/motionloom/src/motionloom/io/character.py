@@ -21,7 +21,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.ground import GroundPose
 from motionloom.io.atomic import atomic_path
-from motionloom.io.glb import Document, accessor_of, add_channel, new_animation, pack_glb
+from motionloom.io.glb import Document, add_channel, entry_of, new_animation, pack_glb
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_nodes import upwards
 from motionloom.io.gltf_read import read_rigs
@@ -51,12 +51,12 @@ class Character(Rig):
     def stand(self) -> GroundPose:
         """Where the character stands and faces; without a mesh, whose nodes may be in the middle of a walk, where what
         is above its skeleton stands."""
-        found = stand(read_body(self.skeleton, self.joints.names()))
+        pose = stand(read_body(self.skeleton, self.joints.names()))
         if self.file.document.items("skins"):
-            return found
+            return pose
         above = upwards(self.nodes[0], self.file.parents)[:0:-1]
         x, _, z = worlds(self.file, above, {}).places[above[-1]][0] if above else np.zeros(3)
-        return GroundPose(float(x), float(z), found.facing)
+        return GroundPose(float(x), float(z), pose.facing)
 
     def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
         """Write the character's own file with one more animation: `save_clips` of one."""
@@ -124,15 +124,15 @@ class Character(Rig):
         free = {0, *(self.shifted & (driven | above_driven))}
         free |= {k for k, n in enumerate(self.nodes) if k and slots[parents[n]] != skeleton.parents[k]}
         if motion.translations is not None:
-            apart = np.abs(motion.translations - skeleton.offsets).max(axis=(0, 2)) > 1e-5
-            free |= set(np.flatnonzero(apart).tolist())
-        wanted = rot.multiply(motion.world_rotations(), self.turns)
+            off = np.abs(motion.translations - skeleton.offsets).max(axis=(0, 2)) > 1e-5
+            free |= set(np.flatnonzero(off).tolist())
+        turns = rot.multiply(motion.world_rotations(), self.turns)
         places = motion.positions()
         now = worlds(self.file, upwards(self.nodes[0], parents)[:0:-1], {})
         keys: list[tuple[int, str, Array]] = []
         for n in parents_first(frozenset(self.nodes), parents):
             k, node, p = slots[n], self.file.nodes[n], parents[n]
-            turn, place = wanted[:, k], places[:, k]
+            turn, place = turns[:, k], places[:, k]
             if p >= 0:
                 back = rot.inverse(now.turns[p])
                 linear = now.linear[p]
@@ -200,7 +200,7 @@ def _with_soles(character: Character) -> Character:
     """The character whose skeleton knows the corners of its feet, where it has a mesh and stands on the floor."""
     skeleton, document = character.skeleton, character.file.document
     up = read_body(skeleton, character.joints.names()).up
-    rest, found = skeleton.rest_positions(), {}
+    rest, soles = skeleton.rest_positions(), {}
     meshes = [mesh for mesh in document.items("meshes") if mesh.get("primitives")]
     if not on_floor(rest @ up):
         if meshes:
@@ -215,10 +215,10 @@ def _with_soles(character: Character) -> Character:
         below = [places[of == j] for places, of in points]
         own = np.concatenate([np.zeros((0, 3)), *below]) - rest[j]
         if len(own):
-            found[j] = own[np.unique((own @ down.T).argmax(axis=0))]
+            soles[j] = own[np.unique((own @ down.T).argmax(axis=0))]
     if meshes and not points:
         _remark_on_soles(character, "has meshes that are compressed (Draco, meshopt) or stored in an unusual way")
-    return replace(character, skeleton=replace(skeleton, soles=found))
+    return replace(character, skeleton=replace(skeleton, soles=soles))
 
 
 def _remark_on_soles(character: Character, why: str) -> None:
@@ -240,7 +240,7 @@ class _Insertion:
         where = {"bufferView": self.view, "byteOffset": len(self.data)}
         ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
         self.data += array.tobytes()
-        self.accessors.append(accessor_of(array.dtype, array.shape, where) | ends)
+        self.accessors.append(entry_of(array.dtype, array.shape, where) | ends)
         return len(self.accessors) - 1
 
     def packed(self) -> bytes:

@@ -19,29 +19,29 @@ def load_fbx(path: Path, *, clip: int | str | None = None) -> Motion:
 
     Raises `MotionloomError` as that does, and where there is no Blender or it cannot read the file.
     """
-    with _glb_of(path) as made:
-        return load_glb(made, clip=clip)
+    with _glb_of(path) as glb:
+        return load_glb(glb, clip=clip)
 
 
 def load_fbx_character(path: Path, *, joint_map: Override | None = None) -> Character:
     """Read the humanoid of an FBX; errors as of `load_fbx`."""
-    with _glb_of(path) as made:
-        return load_character(made, joint_map=joint_map)
+    with _glb_of(path) as glb:
+        return load_character(glb, joint_map=joint_map)
 
 
 @contextmanager
 def _glb_of(path: Path) -> Iterator[Path]:
     """The GLB that Blender makes of an FBX; errors and warnings of the block name the FBX."""
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as said:
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as remarks:
         warnings.simplefilter("always")
-        made = fbx_to_glb(path, Path(folder))
+        glb = fbx_to_glb(path, Path(folder))
         try:
-            yield made
+            yield glb
         except MotionloomError as error:
-            raise MotionloomError(str(error).replace(str(made), str(path))) from None
-    for one in said:
+            raise MotionloomError(str(error).replace(str(glb), str(path))) from None
+    for one in remarks:
         if issubclass(one.category, UserWarning):
-            warnings.warn(str(one.message).replace(str(made), str(path)), stacklevel=4)
+            warnings.warn(str(one.message).replace(str(glb), str(path)), stacklevel=4)
 
 
 def save_fbx(motions: Sequence[Motion], path: Path, *, names: Sequence[str] | None = None) -> Path:
@@ -50,5 +50,5 @@ def save_fbx(motions: Sequence[Motion], path: Path, *, names: Sequence[str] | No
     Raises `MotionloomError` as `save_glb` does, and where there is no Blender or it fails.
     """
     with tempfile.TemporaryDirectory() as folder:
-        made = save_glb(motions, Path(folder) / "motion.glb", names=names)
-        return glb_to_fbx(made, path, fps=motions[0].fps)
+        glb = save_glb(motions, Path(folder) / "motion.glb", names=names)
+        return glb_to_fbx(glb, path, fps=motions[0].fps)

@@ -11,7 +11,7 @@ from motionloom.io.atomic import check_place, new_part
 
 
 def check_folder(path: Path | str) -> Path:
-    """The folder (where a link leads, the place it leads to), if files could be put there or it could be made.
+    """The folder (of a link, what it points to), if files could be written there or it could be created.
 
     Raises `MotionloomError` if it is a file, may not be written to, or is to lie in a folder that is missing.
     """
@@ -21,7 +21,7 @@ def check_folder(path: Path | str) -> Path:
             if path.exists():
                 raise MotionloomError(f"cannot write to {path}: it is a file; name a folder")
             return check_place(path)
-    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: links that lead to each other
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: links that point to each other
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"cannot write to {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
@@ -32,11 +32,11 @@ def check_folder(path: Path | str) -> Path:
 
 @contextmanager
 def atomic_folder(path: Path | str) -> Iterator[Path]:
-    """Give a fresh, hidden folder to write files to, and put them into the folder ``path`` when the block ends well.
+    """Give a fresh, hidden folder to write files to, and move them into the folder ``path`` when the block ends well.
 
-    A folder that is missing is made, and appears with all of its files at once. In one that is there, files of the same
-    names are replaced, and others stay. On any error nothing is left of what was written. Raises `MotionloomError` like
-    `check_folder`, and where the system refuses.
+    A folder that is missing is created, and appears with all of its files at once. In one that is there, files of the
+    same names are replaced, and others stay. On any error nothing is left of what was written. Raises `MotionloomError`
+    like `check_folder`, and where the system refuses.
     """
     target = check_folder(path)
     there = target.is_dir()
@@ -45,8 +45,8 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
         with new_part(target if there else target.parent, is_folder=True) as temporary:
             yield temporary
             with held_back():  # all of them or none
-                _put(temporary, target, there=there)
-    except MotionloomError as error:  # of a file in the hidden folder: name the one that was asked for
+                _move(temporary, target, there=there)
+    except MotionloomError as error:  # of a file in the hidden folder: name the one of the call
         if temporary is None or str(temporary) not in str(error):
             raise
         raise MotionloomError(str(error).replace(str(temporary), str(path))) from error
@@ -61,7 +61,7 @@ def _within(name: object, folder: Path) -> bool:
     return name is None or (isinstance(name, str | Path) and Path(name).is_relative_to(folder))
 
 
-def _put(temporary: Path, target: Path, *, there: bool) -> None:
+def _move(temporary: Path, target: Path, *, there: bool) -> None:
     if not there:
         temporary.rename(target)
         return

@@ -37,8 +37,8 @@ class Document:
     """The other parts of a GLB, whole with their heads."""
     packed: bool = False
     """Whether it is a GLB and no .gltf."""
-    _checked: dict[str, list[dict[str, Any]]] = field(default_factory=dict, compare=False)
-    """Lists of the JSON that were found to be lists of objects: they are asked for again and again."""
+    _lists: dict[str, list[dict[str, Any]]] = field(default_factory=dict, compare=False)
+    """Lists of the JSON that are known to be lists of objects: they are needed again and again."""
 
     def bad(self, what: str) -> MotionloomError:
         """The error for this file."""
@@ -46,18 +46,23 @@ class Document:
 
     def items(self, key: str, owner: dict[str, Any] | None = None) -> list[dict[str, Any]]:
         """A list of objects, such as all nodes; empty where there is none."""
-        if owner is None and key in self._checked:
-            return self._checked[key]
-        found = (self.json if owner is None else owner).get(key, [])
-        if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+        if owner is None and key in self._lists:
+            return self._lists[key]
+        items = (self.json if owner is None else owner).get(key, [])
+        if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
             raise self.bad(f"its {key} are not a list of objects")
         if owner is None:
-            self._checked[key] = found
-        return found
+            self._lists[key] = items
+        return items
+
+    def item(self, key: str, number: Any, what: str = "") -> dict[str, Any]:
+        """One of a list of objects; ``what``: how a message calls them, where not by their key."""
+        items = self.items(key)
+        return items[self.index(number, len(items), what or key)]
 
     def index(self, value: Any, count: int, what: str) -> int:
         """A number that names one of ``count`` things."""
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < count:
+        if type(value) is not int or not 0 <= value < count:
             raise self.bad(f"{shown(str(value))} names none of its {count} {what}")
         return value
 
@@ -70,8 +75,7 @@ class Document:
 
     def accessor(self, number: Any, kind: str, what: str) -> Array:
         """The values (count, width) of an accessor of the given type, as floating point numbers."""
-        accessors = self.items("accessors")
-        accessor = accessors[self.index(number, len(accessors), "accessors")]
+        accessor = self.item("accessors", number)
         if accessor.get("type") != kind:
             raise self.bad(f"{what} must be {kind}, got {shown(str(accessor.get('type')))}")
         if accessor.get("sparse") is not None:
@@ -94,8 +98,7 @@ class Document:
         """(count, 4, 4) an accessor of matrices; None where none can be read."""
         if number is None:
             return None
-        accessors = self.items("accessors")
-        view = accessors[self.index(number, len(accessors), "accessors")].get("bufferView")
+        view = self.item("accessors", number).get("bufferView")
         views = self.items("bufferViews")
         if isinstance(view, int) and 0 <= view < len(views) and compressed(views[view]):
             return None
@@ -103,8 +106,8 @@ class Document:
 
     def _view(self, accessor: dict[str, Any], dtype: np.dtype, shape: tuple[int, int], what: str) -> np.ndarray:
         """The raw entries of an accessor, checked against the bytes that are really there."""
-        views = self.items("bufferViews")
-        view = views[self.index(accessor.get("bufferView"), len(views), f"buffer views ({what})")]
+        number = accessor.get("bufferView")
+        view = self.item("bufferViews", number, f"buffer views ({what})")
         if compressed(view):
             raise self.bad(
                 f"{what} are compressed by meshopt, which is not read; export it without compression "
@@ -118,15 +121,16 @@ class Document:
         offset = self._size(accessor, "byteOffset", what)
         if stride < row or (stride > 252 and stride != row):
             raise self.bad(f"{what} has a byte stride of {stride}")
-        if start + length > len(data) or offset + stride * (shape[0] - 1) + row > length:
+        size = stride * (shape[0] - 1) + row
+        if start + length > len(data) or offset + size > length:
             raise self.bad(f"{what} reaches beyond the end of its data")
-        flat = np.frombuffer(data, np.uint8, stride * (shape[0] - 1) + row, start + offset)
+        flat = np.frombuffer(data, np.uint8, size, start + offset)
         rows = np.lib.stride_tricks.as_strided(flat, (shape[0], row), (stride, 1))
         return np.ascontiguousarray(rows).view(dtype).reshape(shape)
 
     def _size(self, owner: dict[str, Any], key: str, what: str) -> int:
         value = owner.get(key, 0)
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**53:
+        if type(value) is not int or not 0 <= value < 2**53:
             raise self.bad(f"{what} has the {key} {shown(str(value))}")
         return value
 
@@ -155,7 +159,7 @@ def read_document(path: str | Path) -> Document:
 
 
 def compressed(owner: dict[str, Any]) -> bool:
-    """Whether a buffer view or a buffer holds, or stands for, data that meshopt has compressed."""
+    """Whether a buffer view or a buffer holds, or replaces, data that meshopt has compressed."""
     extensions = owner.get("extensions")
     return isinstance(extensions, dict) and bool(
         {"EXT_meshopt_compression", "KHR_meshopt_compression"} & extensions.keys()
@@ -172,7 +176,7 @@ def pack_glb(content: dict[str, Any], binary: bytes, others: bytes = b"") -> byt
     return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
 
 
-def accessor_of(dtype: np.dtype, shape: tuple[int, ...], where: dict[str, int]) -> dict[str, Any]:
+def entry_of(dtype: np.dtype, shape: tuple[int, ...], where: dict[str, int]) -> dict[str, Any]:
     """The JSON of an accessor of numbers of a shape (count, width) that are ``where`` its keys say."""
     component = next(number for number, kind in _KINDS.items() if dtype == kind)
     kind = next(name for name, width in _WIDTHS.items() if width == shape[1])
@@ -220,7 +224,7 @@ def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None, bytes]:
 def _buffer(document: Document, number: int, entry: dict[str, Any], binary: bytes | None) -> bytes:
     uri = entry.get("uri")
     if uri is None and compressed(entry):
-        return b""  # it stands for what is decompressed
+        return b""  # it replaces what is decompressed
     if uri is None:
         if number != 0 or binary is None:
             raise document.bad(f"buffer {number} has no data")
@@ -236,6 +240,6 @@ def _buffer(document: Document, number: int, entry: dict[str, Any], binary: byte
     else:
         raise document.bad(f"it refers to the outside file {shown(str(uri))}, which is not followed; export a .glb")
     declared = entry.get("byteLength")
-    if isinstance(declared, bool) or not isinstance(declared, int) or declared > len(data) or declared < 0:
+    if type(declared) is not int or not 0 <= declared <= len(data):
         raise document.bad(f"buffer {number} declares {shown(str(declared))} bytes and has {len(data)}")
     return data

@@ -16,7 +16,7 @@ from motionloom import rotations as rot
 from motionloom.io import body as bodies
 from motionloom.io.atomic import atomic_path
 from motionloom.io.body import MATERIALS, Piece, check_people
-from motionloom.io.glb import accessor_of, add_channel, new_animation, pack_glb
+from motionloom.io.glb import add_channel, entry_of, new_animation, pack_glb
 from motionloom.io.gltf_read import load_glb, load_glb_people
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
@@ -50,7 +50,7 @@ class _File:
         number = self.append("bufferViews", view | ({} if target is None else {"target": target}))
         self.data.extend(array.tobytes())
         ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
-        return self.append("accessors", accessor_of(array.dtype, array.shape, {"bufferView": number}) | ends)
+        return self.append("accessors", entry_of(array.dtype, array.shape, {"bufferView": number}) | ends)
 
     def key(self, node: int, path: str, clock: int, values: np.ndarray) -> None:
         """Let the animation move a node at the times of the accessor ``clock``."""
@@ -77,7 +77,7 @@ def save_glb(
 
     ``names`` of the people, one per motion, go to the nodes over their trees.
 
-    Nodes stand in rest pose (every rotation the identity); rotations are keyed for every joint but bone tips, places
+    Nodes are in rest pose (every rotation the identity); rotations are keyed for every joint but bone tips, places
     for the root and, where a motion has `Motion.translations`, for every joint.
     Errors: no motions, names of another count, or a path that cannot be written.
     """
@@ -94,7 +94,7 @@ def glb_bytes(motions: Sequence[Motion], *, body: bool = True, names: Sequence[s
     for number, motion in enumerate(motions):
         tail = "" if len(motions) == 1 else f"_{number + 1}"
         first = len(file.lists["nodes"]) + 1
-        # A node of one's own over each tree: Blender makes one armature of all trees that stand side by side.
+        # A node of one's own over each tree: Blender makes one armature of all trees that are side by side.
         name = f"person{tail}" if names is None else names[number]
         file.scene.append(file.append("nodes", {"name": name, "children": [first]}))
         _add_nodes(file, motion.skeleton, first)
@@ -159,7 +159,8 @@ def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> dict
         "WEIGHTS_0": file.add(weights, target=_VERTICES),
     }
     faces = file.add(indices[:, None], "<u2" if len(points) < 65535 else "<u4", target=_INDICES)
-    return {"attributes": attributes, "indices": faces, "material": _material(file, side)}
+    material = _material(file, side)
+    return {"attributes": attributes, "indices": faces, "material": material}
 
 
 def _material(file: _File, side: int) -> int:

@@ -45,7 +45,7 @@ def channels_of(document: Document, nodes: int) -> list[dict[tuple[int, str], di
     result = []
     for animation in document.items("animations"):
         samplers = document.items("samplers", animation)
-        found: dict[tuple[int, str], dict[str, Any]] = {}
+        channels: dict[tuple[int, str], dict[str, Any]] = {}
         for channel in document.items("channels", animation):
             target = channel.get("target")
             if not isinstance(target, dict) or target.get("path") not in ("translation", "rotation", "scale"):
@@ -54,8 +54,8 @@ def channels_of(document: Document, nodes: int) -> list[dict[tuple[int, str], di
                 continue
             node = document.index(target["node"], nodes, "nodes")
             number = document.index(channel.get("sampler"), len(samplers), "animation samplers")
-            found[node, target["path"]] = samplers[number]
-        result.append(found)
+            channels[node, target["path"]] = samplers[number]
+        result.append(channels)
     return result
 
 
@@ -150,8 +150,9 @@ def sample(curve: Curve, times: Array, fps: float, *, turn: bool) -> Array:
     near = 1e-3 / fps + 2e-7 * float(np.abs(times).max())
     if curve.mode != "CUBICSPLINE" and len(keys) == len(times) and np.abs(keys - times).max() < near:
         return values
-    low = np.clip(np.searchsorted(keys, times + near, side="right") - 1, 0, len(keys) - 1)
-    high = np.minimum(low + 1, len(keys) - 1)
+    end = len(keys) - 1
+    low = np.clip(np.searchsorted(keys, times + near, side="right") - 1, 0, end)
+    high = np.minimum(low + 1, end)
     gap = keys[high] - keys[low]
     amount = np.clip((times - keys[low]) / np.where(gap > 0, gap, 1.0), 0.0, 1.0) * (gap > 0)
     a, b, s = values[low], values[high], amount[:, None]

@@ -54,13 +54,12 @@ def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
     for n in file.order:
         joints.setdefault(n, joints.get(file.parents[n]))
     rest = {n: (joints[n], matrix) for n, matrix in rig.rest.items()}
-    found: list[Surface] = []
+    surfaces: list[Surface] = []
     pieces = vertices = unread = 0
     for number, entry in enumerate(document.items("nodes")):
         if entry.get("mesh") is None:
             continue
-        meshes = document.items("meshes")
-        mesh = meshes[document.index(entry["mesh"], len(meshes), "meshes")]
+        mesh = document.item("meshes", entry["mesh"])
         for piece in document.items("primitives", mesh):
             pieces += 1
             try:
@@ -69,7 +68,7 @@ def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
                 unread += 1
                 continue  # compressed, sparse or damaged: what moves does not depend on it
             if surface is not None:
-                found.append(surface)
+                surfaces.append(surface)
                 vertices += len(surface.points)
             if pieces > MAX_PIECES or vertices > MAX_VERTICES:
                 raise document.bad(f"it has more than {MAX_PIECES} pieces of mesh or {MAX_VERTICES:,} vertices")
@@ -78,7 +77,7 @@ def read_surfaces(rig: Rig, *, remark: bool = False) -> list[Surface]:
             f"{document.name}: {unread} of its {pieces} pieces of mesh are left out (compressed, sparse or damaged)",
             stacklevel=2,
         )
-    return found
+    return surfaces
 
 
 @dataclass(frozen=True)
@@ -128,8 +127,7 @@ class _Wearer:
                 return None
             moves = np.broadcast_to(matrix, (count, 1, 4, 4))
             return np.full((count, 1), joint), np.ones((count, 1)), moves
-        skins = document.items("skins")
-        skin = skins[document.index(self.entry["skin"], len(skins), "skins")]
+        skin = document.item("skins", self.entry["skin"])
         listed = [document.index(n, len(rest), "nodes") for n in skin.get("joints", [])]
         carriers = [rest[n][0] for n in listed]
         if not listed or None in carriers:
@@ -156,8 +154,10 @@ class _Wearer:
 
 
 def _optional(document: Document, number: Any, kind: str, count: int) -> Array | None:
-    values = None if number is None else document.accessor(number, kind, "a mesh's attributes")
-    return values if values is not None and len(values) == count else None
+    if number is None:
+        return None
+    values = document.accessor(number, kind, "a mesh's attributes")
+    return values if len(values) == count else None
 
 
 def _triangles(document: Document, number: Any, count: int) -> Whole:

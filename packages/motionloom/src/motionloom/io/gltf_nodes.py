@@ -72,16 +72,15 @@ class OpenedGlb:
     @property
     def lengths(self) -> list[tuple[str, float]]:
         """Name and seconds of each animation."""
-        found = []
+        lengths = []
         for name, animation in zip(self.clips, self.document.items("animations")):
-            ends = [self._end(sampler) for sampler in self.document.items("samplers", animation)]
-            found.append((name, max(ends, default=0.0)))
-        return found
+            ends = map(self._end, self.document.items("samplers", animation))
+            lengths.append((name, max(ends, default=0.0)))
+        return lengths
 
     def _end(self, sampler: dict[str, Any]) -> float:
         """When the keys of a sampler end, as its accessor says."""
-        accessors = self.document.items("accessors")
-        bounds = accessors[self.document.index(sampler.get("input"), len(accessors), "accessors")].get("max")
+        bounds = self.document.item("accessors", sampler.get("input")).get("max")
         right = isinstance(bounds, list) and len(bounds) == 1 and isinstance(bounds[0], int | float)
         return float(bounds[0]) if isinstance(bounds, list) and right else 0.0
 
@@ -92,7 +91,7 @@ class OpenedGlb:
             animations, who = self.document.items("animations"), self.people[person]
             moving = [k for k, a in enumerate(self.channels) if any(n in who for n, _ in a)]
             ours = [k for k in moving if declared_fps(animations[k]) is not None]
-            chosen = ours[-1:] or moving[:1]  # a character comes back with what was made last for it
+            chosen = ours[-1:] or moving[:1]  # of a character the clip written last
             if len(moving) > 1:
                 name = f"number {chosen[0] + 1}" + (f", {clips[chosen[0]]!r}" if clips[chosen[0]] else "")
                 newest = ", the newest of this program's," if ours else ","
@@ -109,8 +108,8 @@ class OpenedGlb:
             listed = ", ".join(f"{k} {name!r}" for k, name in enumerate(clips[:20], start=1))
             more = f" and {len(clips) - 20} more" if len(clips) > 20 else ""
             near = get_close_matches(str(clip), clips, n=1)
-            meant = f"did you mean {near[0]!r}? There" if near else "there"
-            raise MotionloomError(f"{self.document.name} has no clip {clip!r}; {meant} are {listed or 'none'}{more}")
+            hint = f"did you mean {near[0]!r}? There" if near else "there"
+            raise MotionloomError(f"{self.document.name} has no clip {clip!r}; {hint} are {listed or 'none'}{more}")
         return number - 1
 
 

@@ -44,7 +44,7 @@ def open_glb(path: str | Path) -> OpenedGlb:
     parents, order = read_parents(document, nodes)
     channels = channels_of(document, len(nodes))
     skins, humanoid = _skins(document, len(nodes)), humanoid_nodes(document, len(nodes))
-    clips = [printable(animation.get("name")) for animation in document.items("animations")]
+    clips = [printable(clip.get("name")) for clip in document.items("animations")]
     file = OpenedGlb(document, nodes, parents, order, channels, skins, humanoid, clips, [], [])
     people = _people(file)
     carriers = frozenset().union(*people)
@@ -68,10 +68,10 @@ def _motion(file: OpenedGlb, person: int, clip: int | None) -> Motion:
     moved = {} if clip is None else file.channels[clip]
     curves = read_curves(document, {key: sampler for key, sampler in moved.items() if key[0] in joints})
     rig = read_rig(file, person, curves)
-    kept = set(rig.nodes)
-    curves = {key: curve for key, curve in curves.items() if key[0] in kept}
-    declared = None if clip is None else declared_fps(document.items("animations")[clip])
-    fps, times = clock(document, curves, len(rig.nodes), declared)
+    nodes = set(rig.nodes)
+    curves = {key: curve for key, curve in curves.items() if key[0] in nodes}
+    rate = None if clip is None else declared_fps(document.items("animations")[clip])
+    fps, times = clock(document, curves, len(rig.nodes), rate)
     return posed(rig, curves, fps=fps, times=times)
 
 
@@ -85,7 +85,7 @@ def _people(file: OpenedGlb) -> list[frozenset[int]]:
     skins = file.skins
     known = set(file.humanoid.values())
     animated = {node for animation in file.channels for node, _ in animation}
-    if skins:  # a skin in several trees is the person in the one with most of its joints
+    if skins:  # one in several trees is a person in the tree with most of its joints
         groups = [max(_groups(set(skin), order, parents), key=len) for skin in skins]
     else:
         groups = _groups(animated | known, order, parents)
@@ -98,9 +98,9 @@ def _people(file: OpenedGlb) -> list[frozenset[int]]:
     marked = animated.union(*groups)
     people: dict[int, set[int]] = {}
     for group in groups:
-        root = [n for n in upwards(group[0], parents) if n in marked or n == group[0]][-1]
+        root = [n for n in upwards(group[0], parents) if n in marked][-1]
         people.setdefault(root, {root}).update(group)
-    return [_body(root, wanted | animated | known, file.nodes, whole=not skins) for root, wanted in people.items()]
+    return [_body(root, members | animated | known, file.nodes, whole=not skins) for root, members in people.items()]
 
 
 def _skins(document: Document, count: int) -> list[list[int]]:
@@ -118,7 +118,7 @@ def _skins(document: Document, count: int) -> list[list[int]]:
 
 
 def _groups(nodes: set[int], order: list[int], parents: list[int]) -> list[list[int]]:
-    """The given nodes by the tree they stand in, each list headed by the lowest node above (or among) them all."""
+    """The given nodes by the tree they are in, each list headed by the lowest node above (or among) them all."""
     tops: dict[int, int] = {}
     below = dict.fromkeys(order, 0)
     for node in order:
@@ -139,15 +139,15 @@ def _groups(nodes: set[int], order: list[int], parents: list[int]) -> list[list[
     return result
 
 
-def _body(root: int, wanted: set[int], nodes: list[Node], *, whole: bool) -> frozenset[int]:
-    """Nodes below the root that are wanted or lead to wanted ones; all of them if ``whole``."""
+def _body(root: int, members: set[int], nodes: list[Node], *, whole: bool) -> frozenset[int]:
+    """The root and those below it that are members, or above one; all of them if ``whole``."""
     order = [root]
     for i in order:
         order.extend(nodes[i].children)
     if whole:
         return frozenset(order)
-    kept: set[int] = {root}
+    body: set[int] = {root}
     for i in reversed(order):
-        if i in wanted or any(c in kept for c in nodes[i].children):
-            kept.add(i)
-    return frozenset(kept)
+        if i in members or any(c in body for c in nodes[i].children):
+            body.add(i)
+    return frozenset(body)

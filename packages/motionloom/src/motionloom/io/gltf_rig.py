@@ -25,6 +25,8 @@ from motionloom.retarget.names import parts_by_name
 from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
+Matrices = dict[int, Array]
+"""(4, 4) by node."""
 MAX_JOINTS = 10_000
 FAR = 1e6
 """Metres; nobody is further away."""
@@ -48,7 +50,7 @@ class Rig:
     """For each joint the number of its node."""
     turns: Array
     """(joints, 4) at rest: world_from_node."""
-    rest: dict[int, Array]
+    rest: Matrices
     """(4, 4) world_from_node at rest, of every node of the file."""
     shifted: frozenset[int]
     """Joints whose nodes are not where the mesh was bound, on what they hang on."""
@@ -73,32 +75,32 @@ def worlds(
 
     They are added to ``above``, where what is over the line is known already.
     """
-    found = Worlds({}, {}, {}) if above is None else above
+    world = Worlds({}, {}, {}) if above is None else above
     for n in line:
         node, p = file.nodes[n], file.parents[n]
         place = sampled.get((n, "translation"), node.place[None])
         turn = sampled.get((n, "rotation"), node.turn[None])
         scale = sampled.get((n, "scale"), node.scale[None])
-        stretch = found.linear.get(p)
-        if p in found.places:
+        stretch = world.linear.get(p)
+        if p in world.places:
             moved = (
                 np.einsum("...ab,...b->...a", stretch, place)
                 if stretch is not None
-                else rot.rotate(found.turns[p], place)
+                else rot.rotate(world.turns[p], place)
             )
-            place = found.places[p] + moved
+            place = world.places[p] + moved
         plain = stretch is None and np.abs(scale - 1.0).max() < 1e-9
         if not plain:
             own = rot.quat_to_matrix(turn) * scale[:, None, :]
-            whole = rot.quat_to_matrix(found.turns[p]) if p in found.turns and stretch is None else stretch
-            found.linear[n] = own if whole is None else whole @ own
+            whole = rot.quat_to_matrix(world.turns[p]) if p in world.turns and stretch is None else stretch
+            world.linear[n] = own if whole is None else whole @ own
         else:
-            found.linear[n] = None
-        found.places[n] = place
-        if p in found.turns:
-            turn = rot.normalize(rot.multiply(found.turns[p], turn))
-        found.turns[n] = turn
-    return found
+            world.linear[n] = None
+        world.places[n] = place
+        if p in world.turns:
+            turn = rot.normalize(rot.multiply(world.turns[p], turn))
+        world.turns[n] = turn
+    return world
 
 
 def _size(worlds: Worlds, node: int) -> float:
@@ -164,8 +166,8 @@ def posed(rig: Rig, curves: Curves, *, fps: float, times: Array) -> Motion:
         back = rot.inverse(world[:, above])
         rotations[:, 1:] = rot.multiply(back, world[:, 1:])
         inside[:, 1:] = rot.rotate(back, places[:, 1:] - places[:, above])
-    stretched = np.abs(inside[:, 1:] - rig.skeleton.offsets[1:]).max(initial=0.0) > 1e-5
-    return Motion(rig.skeleton, fps, places[:, 0], rotations, inside if stretched else None)
+    moved = np.abs(inside[:, 1:] - rig.skeleton.offsets[1:]).max(initial=0.0) > 1e-5
+    return Motion(rig.skeleton, fps, places[:, 0], rotations, inside if moved else None)
 
 
 # --- rest ---------------------------------------------------------------------------------------------------------
@@ -176,9 +178,9 @@ def _without_still_armatures(file: OpenedGlb, person: int, curves: Curves) -> tu
     nodes, joints = list(file.nodes), set(file.people[person])
     if len(joints) > MAX_JOINTS:
         raise file.document.bad(f"its skeleton has {len(joints)} joints; at most {MAX_JOINTS} can be read")
-    kept = {j for skin in file.skins for j in skin} or file.people[person]
+    skinned = {j for skin in file.skins for j in skin} or file.people[person]
     root = next(n for n in joints if file.parents[n] not in joints)
-    while root not in kept and len(inside := [c for c in nodes[root].children if c in joints]) == 1:
+    while root not in skinned and len(inside := [c for c in nodes[root].children if c in joints]) == 1:
         keyed = [path for path in nodes[root].rest if (root, path) in curves]
         own = {path: curves[root, path].values for path in keyed}
         if any(np.ptp(v, axis=0).max() >= 1e-6 * max(1.0, np.abs(v).max()) for v in own.values()):
@@ -220,16 +222,16 @@ def _bound(
     places = {n: rest.places[n][0] for n in order}
     shifted: set[int] = set()
     bound = _bind_pose(file, list(rest.turns), set(order))
-    near = _SAME_PLACE * float(np.ptp([place for place, _ in bound.values()], axis=0).max()) if bound else 0.0
+    near = _SAME_PLACE * float(np.ptp([p for p, _ in bound.values()], axis=0).max()) if bound else 0.0
     if any(
         abs(float(turn @ turns[n])) < np.cos(_SAME_TURN / 2) or np.linalg.norm(place - places[n]) > near
         for n, (place, turn) in bound.items()
     ):
         for n in order:
-            p, node = file.parents[n], file.nodes[n]
+            p, own = file.parents[n], file.nodes[n]
             if n != order[0]:
-                places[n] = places[p] + rot.rotate(turns[p], node.place * _size(rest, p))
-                turns[n] = rot.multiply(turns[p], node.turn)
+                places[n] = places[p] + rot.rotate(turns[p], own.place * _size(rest, p))
+                turns[n] = rot.multiply(turns[p], own.turn)
             if n in bound:
                 place, turns[n] = bound[n]
                 if n in body and np.linalg.norm(place - places[n]) > near:
@@ -252,15 +254,15 @@ def _bind_pose(file: OpenedGlb, line: list[int], joints: set[int]) -> dict[int, 
 
     ``line``: the nodes from the top down to all joints, parents first. Empty where no skin can be read.
     """
-    inverses: dict[int, dict[int, Array]] = {}  # (4, 4) joint_from_mesh of each skin's joints
+    inverses: dict[int, Matrices] = {}  # (4, 4) joint_from_mesh of each skin's joints
     for number, (skin, listed) in enumerate(zip(file.document.items("skins"), file.skins, strict=True)):
         matrices = file.document.matrices(skin.get("inverseBindMatrices"), "inverse bind matrices")
         if matrices is not None and len(matrices) >= len(listed):
             matrices[:, 3] = [0.0, 0.0, 0.0, 1.0]
-            found = {n: m for n, m in zip(listed, matrices) if n in joints and _turn_of(m) is not None}
-            inverses |= {number: found} if found else {}
+            own = {n: m for n, m in zip(listed, matrices) if n in joints and _turn_of(m) is not None}
+            inverses |= {number: own} if own else {}
     saved = world_from_nodes(file, file.order, {}) if inverses else {}
-    known = dict[int, Array]()
+    known = Matrices()
     bound: dict[int, tuple[Array, Array]] = {}
     for number, inverse in sorted(inverses.items(), key=lambda skin: -len(skin[1])):
         tops = [n for n in line if n in inverse]
@@ -290,13 +292,13 @@ def _turn_of(matrix: Array) -> Array | None:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of nodes above other nodes nobody checked the scales
-def world_from_nodes(file: OpenedGlb, line: list[int], known: Mapping[int, Array]) -> dict[int, Array]:
+def world_from_nodes(file: OpenedGlb, line: list[int], known: Mapping[int, Array]) -> Matrices:
     """(4, 4) of ``line``: nodes, parents first, from the top, as each hangs on what is ``known`` or on the world."""
-    found: dict[int, Array] = {}
+    world: Matrices = {}
     for n in line:
         own, p = file.nodes[n], file.parents[n]
-        found[n] = known[n] if n in known else found[p] @ own.matrix if p >= 0 else own.matrix
-    return found
+        world[n] = known[n] if n in known else world[p] @ own.matrix if p >= 0 else own.matrix
+    return world
 
 
 def on_floor(heights: Array) -> bool:
@@ -305,7 +307,7 @@ def on_floor(heights: Array) -> bool:
     return high > 0 and abs(low) < 0.1 * (high - low)
 
 
-def _space(file: OpenedGlb, saved: dict[int, Array], skin: int, inverse: dict[int, Array], top: int) -> Array:
+def _space(file: OpenedGlb, saved: Matrices, skin: int, inverse: Matrices, top: int) -> Array:
     """(4, 4) world_from_mesh when a skin was bound, ``top`` being its topmost joint; ``saved``: world_from_node."""
     standing = saved[top] @ inverse[top]
     if _turn_of(standing) is None:
@@ -313,12 +315,12 @@ def _space(file: OpenedGlb, saved: dict[int, Array], skin: int, inverse: dict[in
     entries = file.document.items("nodes")
     wearers = [k for k, entry in enumerate(entries) if entry.get("skin") == skin]
     above = [n for n in upwards(top, file.parents)[1:] if n not in inverse]
-    tried = [np.eye(4), *(saved[n] for n in (*above, *wearers[:8]))]
+    spaces = [np.eye(4), *(saved[n] for n in (*above, *wearers[:8]))]
     inside = np.array([np.linalg.inv(m) for m in inverse.values()])
     now, size = standing @ inside, float(np.cbrt(np.linalg.det(standing[:3, :3])))
     first = list(inverse).index(top)
     best, nearest = standing, -1.0
-    for space in tried:
+    for space in spaces:
         if (turn := _turn_of(space)) is None:
             continue
         if abs(float(np.cbrt(np.linalg.det(space[:3, :3]))) / size - 1.0) >= 0.02:
@@ -381,7 +383,7 @@ def _hung(parents: list[int], parts: dict[str, int]) -> list[int]:
 
 
 _BONES = zip(joint_names("vrm"), SMPL22.names)
-VRM_BONES = dict(sorted(_BONES, key=lambda bone: ("right_" in bone[1], "left_" in bone[1])))
+VRM_BONES = dict(sorted(_BONES, key=lambda b: ("right_" in b[1], "left_" in b[1])))
 """VRM's names of the bones that are driven, and the joints of SMPL that they are; the middle first, then each side."""
 
 
@@ -398,7 +400,7 @@ def humanoid_nodes(document: Document, count: int) -> dict[str, int]:
         if isinstance(listed, list):
             bones = {b["bone"]: b for b in listed if isinstance(b, dict) and isinstance(b.get("bone"), str)}
         elif isinstance(listed, dict):
-            bones = {name: bone for name, bone in listed.items() if isinstance(bone, dict)}
+            bones = {name: b for name, b in listed.items() if isinstance(b, dict)}
         if bones:
             break
     return {

@@ -116,40 +116,40 @@ def family(skeleton: Skeleton) -> str:
 
 
 def _problems(motion: Motion, spans: Array, way: Array, height: float, floor: float) -> list[str]:
-    found = []
+    problems = []
     spans = np.median(spans, axis=0)
     if spans[2] > 2 * spans[1] and height > 0.5:
-        found.append("the body lies or Z is up in the file (a person who stands is long in Y); --up z turns it")
+        problems.append("the body lies or Z is up in the file (a person who stands is long in Y); --up z turns it")
     elif not 0.6 <= height <= 2.6:
-        found.append(f"the body is {height:.3g} m tall; if it is a person, give the file's unit with --unit")
+        problems.append(f"the body is {height:.3g} m tall; if it is a person, give the file's unit with --unit")
     elif abs(floor) > 0.15:
-        found.append(f"the lowest joint is at {floor:+.2f} m, so the feet are not on the floor at 0")
+        problems.append(f"the lowest joint is at {floor:+.2f} m, so the feet are not on the floor at 0")
     if len(motion) < 2:
-        found.append("there is one frame only, a pose")
+        problems.append("there is one frame only, a pose")
     if not 10 <= motion.fps <= 500:
-        found.append(f"{motion.fps:g} frames per second is unusual")
+        problems.append(f"{motion.fps:g} frames per second is unusual")
     step = np.linalg.norm(np.diff(way, axis=0), axis=-1) * motion.fps
     if len(step) and step.max() > 15:
-        found.append(f"the root jumps at frame {int(step.argmax()) + 1} ({step.max():.0f} m/s)")
+        problems.append(f"the root jumps at frame {int(step.argmax()) + 1} ({step.max():.0f} m/s)")
     turn = _largest_turn(motion)
     if turn[0] > np.radians(100):
         name = motion.skeleton.names[turn[2]]
-        found.append(f"{name!r} turns by {np.degrees(turn[0]):.0f} degrees from frame {turn[1]} to {turn[1] + 1}")
+        problems.append(f"{name!r} turns by {np.degrees(turn[0]):.0f} degrees from frame {turn[1]} to {turn[1] + 1}")
     if motion.translations is not None and _stretch(motion) > 0.01:
-        found.append(f"bones change their length by up to {_stretch(motion):.2f} m")
-    return found
+        problems.append(f"bones change their length by up to {_stretch(motion):.2f} m")
+    return problems
 
 
 def _largest_turn(motion: Motion) -> tuple[float, int, int]:
     """Largest change of one joint's rotation between neighbouring frames: radians, frame, joint."""
     largest = 0.0, 0, 0
-    for begin in range(0, len(motion) - 1, _BLOCK):
-        turns = motion.rotations[begin : begin + _BLOCK + 1]
+    for at in range(0, len(motion) - 1, _BLOCK):
+        turns = motion.rotations[at : at + _BLOCK + 1]
         change = rot.multiply(rot.inverse(turns[:-1]), turns[1:])
         angle = 2 * np.arccos(np.clip(np.abs(change[..., 0]), 0, 1))
         frame, joint = np.unravel_index(int(angle.argmax()), angle.shape)
         if angle[frame, joint] > largest[0]:
-            largest = float(angle[frame, joint]), begin + int(frame), int(joint)
+            largest = float(angle[frame, joint]), at + int(frame), int(joint)
     return largest
 
 
@@ -158,8 +158,8 @@ def _stretch(motion: Motion) -> float:
     assert motion.translations is not None
     shortest = np.full(len(motion.skeleton) - 1, np.inf)
     longest = np.zeros(len(motion.skeleton) - 1)
-    for begin in range(0, len(motion), _BLOCK):
-        lengths = np.linalg.norm(motion.translations[begin : begin + _BLOCK, 1:], axis=-1)
+    for at in range(0, len(motion), _BLOCK):
+        lengths = np.linalg.norm(motion.translations[at : at + _BLOCK, 1:], axis=-1)
         shortest = np.minimum(shortest, lengths.min(axis=0))
         longest = np.maximum(longest, lengths.max(axis=0))
     parents = np.array(motion.skeleton.parents[1:])

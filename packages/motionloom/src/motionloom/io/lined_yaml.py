@@ -57,12 +57,12 @@ class Lined:
             return "a mapping"
         if isinstance(self.value, str):
             return shown(self.value)
-        said = kind_of(self.value)
-        return said if said.startswith("a ") else f"the number {said}"
+        kind = kind_of(self.value)
+        return kind if kind.startswith("a ") else f"the number {kind}"
 
 
 def lined_of(value: Any) -> tuple[Lined, tuple[str, ...]]:
-    """Plain values as `read_lined` gives those of a file; each ``line`` is a number of what leads there, in keys."""
+    """Plain values as `read_lined` gives those of a file; each ``line`` is the number of the value's path of keys."""
     places: list[str] = []
 
     def lined(inner: Any, name: str) -> Lined:
@@ -120,6 +120,10 @@ class _Open:
         self.key: str | None = None
         self.key_line = 0
 
+    @property
+    def needs_key(self) -> bool:
+        return isinstance(self.values, dict) and self.key is None
+
 
 def _build(events: Iterator[Any], path: Path | str) -> Lined:
     import yaml
@@ -137,29 +141,29 @@ def _build(events: Iterator[Any], path: Path | str) -> Lined:
             continue
         if kind in (yaml.MappingEndEvent, yaml.SequenceEndEvent):
             opened = stack.pop()
-            found = Lined(opened.line, opened.values)
+            item = Lined(opened.line, opened.values)
         else:
             _refuse_clever(event, kind, path, line)
             values += 1
             if kind is not yaml.ScalarEvent:
                 if len(stack) >= MAX_DEPTH:
                     fail(path, line, f"values lie in each other more than {MAX_DEPTH} deep")
-                if stack and isinstance(stack[-1].values, dict) and stack[-1].key is None:
+                if stack and stack[-1].needs_key:
                     fail(path, line, "a key must be one word, not a list or mapping")
                 stack.append(_Open(line, {} if kind is yaml.MappingStartEvent else []))
                 continue
             if values > MAX_VALUES:
                 fail(path, line, f"the file holds more than {MAX_VALUES:,} values")
-            if stack and isinstance(stack[-1].values, dict) and stack[-1].key is None:
+            if stack and stack[-1].needs_key:
                 if event.value in stack[-1].values:
                     fail(path, line, f"the key {shown(event.value)} stands here a second time; drop one of them")
                 stack[-1].key, stack[-1].key_line = event.value, line
                 continue
-            found = Lined(line, _scalar(event, path, line))
+            item = Lined(line, _scalar(event, path, line))
         if stack:
-            _put(stack[-1], found, path)
+            _add(stack[-1], item, path)
         else:
-            top = found
+            top = item
     if top is None:
         raise MotionloomError(f"{path} holds nothing but comments")
     return top
@@ -174,14 +178,14 @@ def _refuse_clever(event: Any, kind: type, path: Path | str, line: int) -> None:
         fail(path, line, f"tags ({shown(str(event.tag))}) are not read; write the value without it")
 
 
-def _put(opened: _Open, found: Lined, path: Path | str) -> None:
+def _add(opened: _Open, item: Lined, path: Path | str) -> None:
     if len(opened.values) >= MAX_ITEMS:
-        fail(path, found.line, f"more than {MAX_ITEMS:,} in one list are not read; split the file")
+        fail(path, item.line, f"more than {MAX_ITEMS:,} in one list are not read; split the file")
     if isinstance(opened.values, list):
-        opened.values.append(found)
+        opened.values.append(item)
         return
     assert opened.key is not None
-    opened.values[opened.key] = Lined(found.line, found.value, opened.key_line)
+    opened.values[opened.key] = Lined(item.line, item.value, opened.key_line)
     opened.key = None
 
 

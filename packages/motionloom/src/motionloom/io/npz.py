@@ -136,20 +136,21 @@ def read_arrays(
         path: An .npz file, its members stored or packed with deflate.
         max_bytes: Most bytes of the file, and of its arrays together. A small file may not unfold to very many numbers
             either: at most `SPARE_NUMBERS`, or `NUMBERS_PER_BYTE` for each of its bytes.
-        only: Names of the arrays that are wanted; the others are never looked at.
+        only: Names of the arrays to read; the others are never looked at.
 
     Raises:
         MotionloomError: It is missing, too large, damaged or no such archive.
     """
     with opened(path, max_bytes=max_bytes) as (archive, members, most):
-        wanted = {n: m for n, m in members.items() if only is None or n in only}
-        found: dict[str, np.ndarray] = {}
-        for name, member in wanted.items():
+        members = {n: m for n, m in members.items() if only is None or n in only}
+        arrays: dict[str, np.ndarray] = {}
+        for name, member in members.items():
             with archive.open(member) as stream:
                 what = f"{path}: the array {text.shown(name)}"
-                found[name] = _read_array(cast(BinaryIO, stream), member.file_size, most=most, what=what)
-            most -= max(found[name].size, found[name].nbytes // 8)
-        return found
+                array = _read_array(cast(BinaryIO, stream), member.file_size, most=most, what=what)
+            arrays[name] = array
+            most -= max(array.size, array.nbytes // 8)
+        return arrays
 
 
 @contextmanager
@@ -213,16 +214,16 @@ def _read_array(stream: BinaryIO, size: int, *, most: int, what: str) -> np.ndar
     shape, fortran, dtype = read_header(stream)
     if dtype.kind not in "fiubU":
         raise MotionloomError(f"{what} holds {dtype}, not numbers or text; pickled objects are never read")
-    wanted, left = math.prod(shape) * dtype.itemsize, size - stream.tell()
-    if wanted != left:
+    length, left = math.prod(shape) * dtype.itemsize, size - stream.tell()
+    if length != left:
         raise MotionloomError(f"{what} says {shape} but holds {left} bytes; it is damaged")
-    if max(math.prod(shape), wanted // 8) > most:
+    if max(math.prod(shape), length // 8) > most:
         raise MotionloomError(f"{what} has the shape {shape}, far more numbers than so small a file may hold")
-    data = stream.read(wanted)
-    if len(data) != wanted:
+    data = stream.read(length)
+    if len(data) != length:
         raise MotionloomError(f"{what} says {shape} but holds {len(data)} bytes; it is damaged")
-    flat = np.frombuffer(data, dtype=dtype) if wanted else np.empty(0, dtype)
-    if dtype.kind == "U" and wanted:
+    flat = np.frombuffer(data, dtype=dtype) if length else np.empty(0, dtype)
+    if dtype.kind == "U" and length:
         codes = flat.view(np.dtype(np.uint32).newbyteorder(dtype.byteorder))
         if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
             raise MotionloomError(f"{what} holds characters that do not exist; it is damaged")
@@ -240,14 +241,14 @@ class _Archive:
         return name in self.arrays
 
     def take(self, name: str, shape: tuple[int | None, ...], kinds: str = "fiu") -> np.ndarray:
-        """The array of that name with the wanted shape (None: any length) and kind of number."""
+        """The array of that name with this shape (None: any length) and kind of number."""
         if name not in self:
             raise MotionloomError(f"{self.path} has no array '{name}'; it has {self.listed()}")
         array = self.arrays[name]
         same = len(array.shape) == len(shape) and all(w is None or w == n for w, n in zip(shape, array.shape))
         if not same or array.dtype.kind not in kinds:
-            wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-            raise self.bad(f"'{name}' must have the shape {wanted}; it is {array.shape} of {array.dtype}")
+            sizes = ", ".join("any" if n is None else str(n) for n in shape)
+            raise self.bad(f"'{name}' must have the shape ({sizes}); it is {array.shape} of {array.dtype}")
         # without a copy of all numbers; NaN is neither
         small = kinds == "U" or not array.size or (array.min() >= -text.LIMIT and array.max() <= text.LIMIT)
         if not small:
@@ -276,8 +277,9 @@ def _motion(file: _Archive, fps: float) -> Motion:
     ends = {int(e) for e in file.take("ends", (None,))} if "ends" in file else set()
     if any(not 0 <= e < joints for e in ends):
         raise file.bad(f"'ends' names joints that do not exist; there are {joints}")
-    root, rotations, moved = _frames(file, ("root", "rotations", "translations"), joints)
-    groups = SMPL22.groups if names == SMPL22.names and parents == SMPL22.parents else {}
+    root, rotations, moved = _frames(file, joints)
+    is_person = (names, parents) == (SMPL22.names, SMPL22.parents)
+    groups = SMPL22.groups if is_person else {}
     try:
         body = _body(file, names)
         skeleton = Skeleton(names, parents, offsets.astype(np.float64), frozenset(ends), groups, **body)
@@ -286,18 +288,17 @@ def _motion(file: _Archive, fps: float) -> Motion:
         raise file.bad(error) from None
 
 
-def _frames(
-    file: _Archive, names: tuple[str, str, str], joints: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+def _frames(file: _Archive, joints: int, prefix: str = "") -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Places of the root, rotations, and translations where there are any."""
-    root = file.take(names[0], (None, 3))
-    rotations = file.take(names[1], (len(root), joints, 4)).astype(np.float64)
-    lengths = np.linalg.norm(rotations, axis=-1)
+    root = file.take(f"{prefix}root", (None, 3))
+    turns = file.take(f"{prefix}rotations", (len(root), joints, 4)).astype(np.float64)
+    lengths = np.linalg.norm(turns, axis=-1)
     if not (np.abs(lengths - 1) < 1e-3).all():
         odd = lengths.flat[np.abs(lengths - 1).argmax()]
-        raise file.bad(f"'{names[1]}' must be unit quaternions; one has the length {odd:g}")
-    moved = file.take(names[2], (len(root), joints, 3)) if names[2] in file else None
-    return root, rotations, moved
+        raise file.bad(f"'{prefix}rotations' must be unit quaternions; one has the length {odd:g}")
+    name = f"{prefix}translations"
+    moved = file.take(name, (len(root), joints, 3)) if name in file else None
+    return root, turns, moved
 
 
 class _Body(TypedDict, total=False):
@@ -326,7 +327,7 @@ def _body(file: _Archive, names: tuple[str, ...]) -> _Body:
             raise file.bad(f"'sole_joints' names joints that do not exist; there are {len(names)}")
         body["soles"] = {int(j): points[joints == j] for j in dict.fromkeys(joints.tolist())}
     if "pose_root" in file:
-        frames = _frames(file, ("pose_root", "pose_rotations", "pose_translations"), len(names))
+        frames = _frames(file, len(names), "pose_")
         if not len(frames[0]):
             raise file.bad("'pose_root' has no pose; leave it out")
         body["poses"] = Poses(*frames)

@@ -1,4 +1,4 @@
-"""Files that are written while the motion is being made, so that an hour needs no more memory than a minute.
+"""Files that are written while the motion is being generated, so that an hour needs no more memory than a minute.
 
 A BVH file grows on the disk. The other formats need the whole motion: their pieces are kept and saved at the end.
 Either way the file appears whole, at its place, when the stream is closed, also after an interruption.
@@ -101,7 +101,7 @@ def open_stream(
     order: str | Mapping[str, str] = "ZXY",
     unit: float = 1.0,
 ) -> Stream:
-    """A file to be written piece by piece; the suffix picks the format as in `save`, and nothing is made yet.
+    """A file to be written piece by piece; the suffix picks the format as in `save`, and nothing is written yet.
 
     ``total`` is the number of frames to come if that is known; with it what the format cannot hold is refused now
     and not after hours of work. ``caption`` labels pictures and films; ``order`` and ``unit`` are those of a BVH, as
@@ -184,11 +184,16 @@ class Kept(Stream):
         self._pieces = []
 
 
-def joined(pieces: Sequence[Motion]) -> Motion:
-    """Consecutive pieces of one skeleton and rate as one motion; bones of constant lengths."""
-    root = np.concatenate([piece.root for piece in pieces])
-    rotations = np.concatenate([piece.rotations for piece in pieces])
-    return replace(pieces[0], root=root, rotations=rotations)
+def joined(motions: Sequence[Motion]) -> Motion:
+    """Motions of one skeleton and rate, one after the other, as one motion."""
+    moved = None
+    if any(motion.translations is not None for motion in motions):
+        rest = motions[0].skeleton.offsets[None]
+        pieces = [m.translations if m.translations is not None else rest.repeat(len(m), axis=0) for m in motions]
+        moved = np.concatenate(pieces)
+    root = np.concatenate([motion.root for motion in motions])
+    rotations = np.concatenate([motion.rotations for motion in motions])
+    return replace(motions[0], root=root, rotations=rotations, translations=moved)
 
 
 def resampled(pieces: Iterable[Motion], fps: float) -> Iterator[Motion]:
@@ -197,7 +202,7 @@ def resampled(pieces: Iterable[Motion], fps: float) -> Iterator[Motion]:
     Each piece is held back by its last frame, between which and the next piece new frames may lie.
     """
     carried: Motion | None = None
-    first = made = 0  # the frame of the whole motion that the part in hand begins with; frames given so far
+    first = total = 0  # the frame of the whole motion that ``part`` begins with; frames yielded so far
     for piece in pieces:
         if piece.fps == fps and carried is None:
             yield piece
@@ -205,6 +210,6 @@ def resampled(pieces: Iterable[Motion], fps: float) -> Iterator[Motion]:
         part = piece if carried is None else joined([carried, piece])
         last = first + len(part) - 1
         count = int(np.floor(last / part.fps * fps + 1e-6)) + 1
-        if count > made:
-            yield part.at(np.arange(made, count) * (part.fps / fps) - first, fps)
-        carried, first, made = part.frames(len(part) - 1, len(part)), last, count
+        if count > total:
+            yield part.at(np.arange(total, count) * (part.fps / fps) - first, fps)
+        carried, first, total = part.frames(len(part) - 1, len(part)), last, count

@@ -102,9 +102,9 @@ def shown(raw: bytes | str, limit: int = 40) -> str:
     return quoted(word(raw) if isinstance(raw, bytes) else raw, limit)
 
 
-def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
-    """The names, of which a second ``hand`` becomes ``hand_2``, as does a first one that is ``taken``."""
-    used, counts, unique = set(taken), dict[str, int](), []
+def unique_names(names: Iterable[str], others: Iterable[str] = ()) -> tuple[str, ...]:
+    """The names, of which a second ``hand`` becomes ``hand_2``, as does a first one that is among ``others``."""
+    used, counts, unique = set(others), dict[str, int](), []
     for name in names:
         free = name
         while free in used:

@@ -68,7 +68,7 @@ def _write_person(file: IO[str], motion: Motion, title: str, surfaces: Sequence[
     rest = skeleton.rest_positions()
     file.write(f'    def SkelRoot "{title}" (\n        prepend apiSchemas = ["SkelBindingAPI"]\n    )\n    {{\n')
     around = motion.positions().reshape(-1, 3)
-    low, high = around.min(axis=0) - 0.3, around.max(axis=0) + 0.3  # with room for a body
+    low, high = around.min(axis=0) - 0.3, around.max(axis=0) + 0.3  # room for a body
     file.write(f"        float3[] extent = [{_tuple(low)}, {_tuple(high)}]\n")
     file.write('        def Skeleton "skeleton" (\n            prepend apiSchemas = ["SkelBindingAPI"]\n        )\n')
     file.write(f"        {{\n            uniform token[] joints = {_words(paths)}\n")
@@ -95,8 +95,8 @@ def _write_animation(file: IO[str], motion: Motion, paths: Sequence[str]) -> Non
     file.write("                }\n                float3[] translations.timeSamples = {\n")
     for frame in range(len(motion)):
         offsets = motion.skeleton.offsets if motion.translations is None else motion.translations[frame]
-        places = [motion.root[frame], *offsets[1:]]
-        file.write(f"                    {frame}: [{', '.join(map(_tuple, places))}],\n")
+        row = [motion.root[frame], *offsets[1:]]
+        file.write(f"                    {frame}: [{', '.join(map(_tuple, row))}],\n")
     file.write("                }\n            }\n")
 
 
@@ -106,10 +106,10 @@ def _write_animation(file: IO[str], motion: Motion, paths: Sequence[str]) -> Non
 def _simple(motion: Motion) -> list[Surface]:
     """The body that a motion without a mesh of its own is shown with."""
     rest = motion.skeleton.rest_positions()
-    found = []
+    surfaces = []
     for piece in body(motion):
         count = len(piece.points)
-        found.append(
+        surfaces.append(
             Surface(
                 f"body_{motion.skeleton.names[piece.joint]}",
                 piece.points + rest[piece.joint],
@@ -121,7 +121,7 @@ def _simple(motion: Motion) -> list[Surface]:
                 MATERIALS[piece.side][1],
             )
         )
-    return found
+    return surfaces
 
 
 def _colours(surfaces: Sequence[Surface]) -> list[tuple[float, ...]]:
@@ -157,12 +157,12 @@ def _write_surface(file: IO[str], surface: Surface, number: int, place: str, col
     if surface.normals is not None:
         _write_list(file, f"{tab}normal3f[] normals", map(_tuple, surface.normals), vertex)
     if surface.texture is not None:
-        upright = surface.texture * [1.0, -1.0] + [0.0, 1.0]  # USD's begin in the lower left
-        _write_list(file, f"{tab}texCoord2f[] primvars:st", map(_tuple, upright), vertex)
-    shares = f"elementSize = {width}\n{tab}    {vertex}"
+        st = surface.texture * [1.0, -1.0] + [0.0, 1.0]  # USD's begin in the lower left
+        _write_list(file, f"{tab}texCoord2f[] primvars:st", map(_tuple, st), vertex)
+    pairs = f"elementSize = {width}\n{tab}    {vertex}"
     joints, weights = surface.joints.ravel().tolist(), surface.weights.ravel().tolist()
-    _write_list(file, f"{tab}int[] primvars:skel:jointIndices", map(str, joints), shares)
-    _write_list(file, f"{tab}float[] primvars:skel:jointWeights", map(_number, weights), shares)
+    _write_list(file, f"{tab}int[] primvars:skel:jointIndices", map(str, joints), pairs)
+    _write_list(file, f"{tab}float[] primvars:skel:jointWeights", map(_number, weights), pairs)
     file.write(f"{tab}matrix4d primvars:skel:geomBindTransform = {_shift(np.zeros(3))}\n")
     file.write(f"{tab}color3f[] primvars:displayColor = [{_tuple(surface.colour)}]\n")
     file.write(f"{tab}rel material:binding = <{place}/materials/colour_{colour}>\n")
@@ -171,7 +171,7 @@ def _write_surface(file: IO[str], surface: Surface, number: int, place: str, col
     file.write("        }\n")
 
 
-def _write_list(file: IO[str], what: str, values: "Iterator[str]", more: str = "") -> None:
+def _write_list(file: IO[str], what: str, values: Iterator[str], more: str = "") -> None:
     file.write(f"{what} = [{', '.join(values)}]")
     indent = " " * 16
     file.write(f" (\n{indent}{more}\n            )\n" if more else "\n")
@@ -202,15 +202,15 @@ def _identifier(name: str) -> str:
 
 def _words(names: Sequence[str]) -> str:
     escaped = [name.replace("\\", "\\\\").replace('"', '\\"') for name in names]
-    shown = ("".join(c if c.isprintable() else "?" for c in name) for name in escaped)
-    return "[" + ", ".join(f'"{name}"' for name in shown) + "]"
+    plain = ("".join(c if c.isprintable() else "?" for c in name) for name in escaped)
+    return "[" + ", ".join(f'"{name}"' for name in plain) + "]"
 
 
 def _number(value: float) -> str:
     return f"{value:.9g}" if value else "0"
 
 
-def _tuple(values: "Array | Sequence[float]") -> str:
+def _tuple(values: Array | Sequence[float]) -> str:
     return "(" + ", ".join(_number(float(v)) for v in values) + ")"
 
 

@@ -54,7 +54,7 @@ def save_vrma(motion: Motion, path: str | Path) -> Path:
 def _bones(skeleton: Skeleton) -> dict[str, int] | None:
     """The joints of an avatar's body parts; None for what is none, or does not rest as such files have to."""
     stated = skeleton.humanoid.items()
-    bones = {part: skeleton.index(name) for part, name in stated if name in skeleton.names}
+    bones = {part: skeleton.index(n) for part, n in stated if n in skeleton.names}
     if not bones.keys() >= _NEEDED or any(bones["pelvis"] not in skeleton.ancestors(j) for j in bones.values()):
         return None
     rest = skeleton.rest_positions()

@@ -32,7 +32,7 @@ def _side(side: str) -> tuple[tuple, ...]:
         ("shoulder", "elbow", 0.0481),
         ("elbow", "wrist", 0.0366),
     )
-    return tuple(_limb(f"{side}_{a}", f"{side}_{b}", thick, 0.74 * thick) for a, b, thick in bones)
+    return tuple(_limb(f"{side}_{a}", f"{side}_{b}", r, 0.74 * r) for a, b, r in bones)
 
 
 CAPSULES: tuple[tuple, ...] = (
@@ -42,7 +42,7 @@ CAPSULES: tuple[tuple, ...] = (
     _limb("neck", "head", 0.0237, 0.0175),
     # the head of the drawn figure: a ball of 5.5 % of the height over the head's joint
     (_at(head=1.47, neck=-0.47), _at(head=1.99, neck=-0.99), 0.052 * _HEIGHT, 0.052 * _HEIGHT),
-    # the trunk is wider than deep: pelvis and chest lie across, the belly stands; radii are the drawn half depths
+    # the trunk is wider than deep: pelvis and chest lie across, the belly is upright; radii are the drawn half depths
     (_at(left_hip=1.0), _at(right_hip=1.0), 0.050 * _HEIGHT, 0.050 * _HEIGHT),
     (_at(pelvis=1.0), _at(spine3=1.0), 0.055 * _HEIGHT, 0.055 * _HEIGHT),
     (
@@ -137,5 +137,5 @@ def trunk_distance(first: np.ndarray, second: np.ndarray) -> Array:
 
 def wrist_distance(first: np.ndarray, second: np.ndarray) -> Array:
     """(frames,) metres between the two people's nearest wrists; shapes as of `overlap`."""
-    hands = [np.asarray(one, dtype=np.float64)[:, list(WRISTS)] for one in (first, second)]
+    hands = [np.asarray(one, dtype=np.float64)[:, WRISTS] for one in (first, second)]
     return np.asarray(np.linalg.norm(hands[0][:, :, None] - hands[1][:, None], axis=-1).min(axis=(1, 2)))

@@ -1,6 +1,6 @@
 """What it costs a body to move its joints, and how far its limbs reach: tables by the names of joints.
 
-A name without a side, such as ``knee``, stands for both sides. What solves for poses reads these tables by joint number
+A name without a side, such as ``knee``, is for both sides. What solves for poses reads these tables by joint number
 (`by_number`); everything about one quantity is in one table.
 """
 
@@ -81,8 +81,7 @@ def by_number(table: Mapping[str, T]) -> dict[int, T]:
 
 def beside(joint: int, name: str) -> int:
     """The number of the joint of that name on the side of another; the only one where there is one."""
-    found = numbers(name)
-    return found[-1] if SMPL22.names[joint].startswith("right_") else found[0]
+    return numbers(name)[-1 if SMPL22.names[joint].startswith("right_") else 0]
 
 
 LEGS: tuple[tuple[int, int, int], ...] = tuple(zip(*map(numbers, LEG), strict=True))

@@ -9,6 +9,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
@@ -29,7 +30,7 @@ _TURN_EASE = 0.1
 """The same for its direction; longer would flatten the foot while it still swings."""
 _LOW = np.array([0.11, 0.05, 0.11, 0.05])
 """Metres above the level of standing toes below which ankles and toes may be planted."""
-_SLOW, _STILL_SLOW, _TOLD_SLOW = 0.35, 0.5, 0.6
+_SLOW, _STILL_SLOW, _CONTACT_SLOW = 0.35, 0.5, 0.6
 """Metres per second: what starts a contact, what keeps it, and what a foot said to be planted may have."""
 _DRIFT = 0.12
 """Metres: a planted foot that strays further from the middle of its stance means to move; the stance is split."""
@@ -51,7 +52,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
     ``motion`` on the 22-joint skeleton; ``contacts`` (frames or frames - 1, 4), flags or probabilities for left ankle,
     left foot, right ankle, right foot as the 263 features have them, else height and speed decide; ``floor`` metres.
     Changes the legs, and the height of the root where a leg would be too short. Everything else stays as it is. The
-    first ``shown`` frames stay too: a foot that stands at the last of them stands on where it is.
+    first ``shown`` frames stay too: a foot that stands at the last of them stays where it is.
     """
     if motion.skeleton != SMPL22:
         raise MotionloomError(
@@ -60,27 +61,30 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         )
     if len(motion) < 4:
         return motion
-    places = motion.positions()
-    planted = planted_feet(places, motion.fps, contacts=contacts)
-    level = toe_level(places, motion.fps) - floor
+    places, fps = motion.positions(), motion.fps
+    planted = planted_feet(places, fps, contacts=contacts)
+    level = toe_level(places, fps) - floor
     height = floor + level - np.clip(level, -_NEAR, _NEAR) * np.clip((3 * _NEAR - abs(level)) / (2 * _NEAR), 0, 1)
     targets, directions = places[:, [limb.end for limb in LIMBS[:2]]].copy(), np.empty((len(motion), 2, 3))
-    free = _coming(len(motion), shown, max(1, round(EASE * motion.fps)))
+    free = _coming(len(motion), shown, max(1, round(EASE * fps)))
     for i in (0, 1):
         ankle, toe = FEET[2 * i : 2 * i + 2]
         foot = places[:, toe] - places[:, ankle]
         flags = planted[:, 2 * i : 2 * i + 2]
-        directions[:, i] = _steady_direction(foot, flags[:, 0] & flags[:, 1], motion.fps, shown)
+        flat = flags[:, 0] & flags[:, 1]
+        directions[:, i] = _steady_direction(foot, flat, fps, shown)
         tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
         since = max(shown - 1, 0)
         ends = places[since:, ankle] - [0, height, 0]
-        moved = correction(ends, ends + tip[since:], flags[since:], motion.fps, held=shown > 0, level=True)
+        moved = correction(ends, ends + tip[since:], flags[since:], fps, held=shown > 0, level=True)
         targets[since:, i] += moved
-        stretched = envelope(_overreach(places, targets, i), round(_LIFT_EASE * motion.fps))
+        stretched = envelope(_overreach(places, targets, i), round(_LIFT_EASE * fps))
         targets[since:, i, 1] += np.minimum(stretched[since:], -np.minimum(moved[:, 1], 0))
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
-        targets[:, i, 1] += free * envelope((below - _SUNK).clip(0), round(_LIFT_EASE * motion.fps))
-    down = free * _root_drop(places, targets, motion.fps)
+        targets[:, i, 1] += free * envelope((below - _SUNK).clip(0), round(_LIFT_EASE * fps))
+    # the root goes down so that no leg is stretched too far
+    need = np.maximum(*(_overreach(places, targets, i) for i in (0, 1)))
+    down = free * envelope(need.clip(0, 0.05), round(0.15 * fps))
     return _with_legs(motion, places - down[:, None, None] * [0, 1, 0], targets, directions)
 
 
@@ -95,7 +99,7 @@ def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | No
     if contacts is None:
         may, sure = low & (speed < _STILL_SLOW), low & (speed < _SLOW)
     else:
-        may = low & (speed < _TOLD_SLOW) & _told(contacts, len(feet))
+        may = low & (speed < _CONTACT_SLOW) & _contact_flags(contacts, len(feet))
         sure = may
     least, gap = max(2, round(0.12 * fps)), max(1, round(0.1 * fps))
     result = np.zeros_like(may)
@@ -109,11 +113,14 @@ def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | No
 def toe_level(positions: np.ndarray, fps: float) -> float:
     """Height in metres at which toes rest in ``positions`` (frames, 22, 3) metres; that of the lowest where none do."""
     feet = np.asarray(positions)[:, list(FEET)]
-    resting = np.linalg.norm(np.gradient(feet[:, [1, 3]], axis=0), axis=-1) * fps < _SLOW
-    return float(np.percentile(feet[:, [1, 3], 1][resting], 30) if resting.any() else feet[..., 1].min())
+    toes = feet[:, [1, 3]]
+    resting = np.linalg.norm(np.gradient(toes, axis=0), axis=-1) * fps < _SLOW
+    if not resting.any():
+        return float(feet[..., 1].min())
+    return float(np.percentile(toes[..., 1][resting], 30))
 
 
-def _told(contacts: np.ndarray, frames: int) -> Flags:
+def _contact_flags(contacts: np.ndarray, frames: int) -> Flags:
     contacts = np.asarray(contacts, dtype=np.float64)
     if contacts.ndim != 2 or contacts.shape[1] != 4 or len(contacts) not in (frames, frames - 1):
         raise MotionloomError(f"contacts must be ({frames}, 4) or ({frames - 1}, 4); got {contacts.shape}")
@@ -150,7 +157,7 @@ def _steady_direction(foot: Array, flat: Flags, fps: float, shown: int = 0) -> A
         after = min(ease, runs[i + 1][0] - stop + 1) if i + 1 < len(runs) else ease
         away = np.maximum((start - frames) / before, (frames - stop + 1) / after)
         weight = 1 - smoothstep(away)
-        if start < shown < stop:  # it stands on as it was shown
+        if start < shown < stop:  # it stays as it was
             steady = unit[shown - 1]
             weight[:shown] = 0
         else:
@@ -251,19 +258,13 @@ def envelope(need: Array, radius: int) -> Array:
     """A smooth curve (..., frames) nowhere below ``need``: running maximum, then averages within its window."""
     radius = max(1, radius)
     curve = np.pad(need, [(0, 0)] * (need.ndim - 1) + [(4 * radius, 4 * radius)], mode="edge")
-    curve = np.lib.stride_tricks.sliding_window_view(curve, 4 * radius + 1, axis=-1).max(-1)
+    curve = sliding_window_view(curve, 4 * radius + 1, axis=-1).max(-1)
     for _ in range(2):
-        curve = np.lib.stride_tricks.sliding_window_view(curve, 2 * radius + 1, axis=-1).mean(-1)
+        curve = sliding_window_view(curve, 2 * radius + 1, axis=-1).mean(-1)
     return curve
 
 
 # Legs
-
-
-def _root_drop(places: Array, targets: Array, fps: float) -> Array:
-    """(frames,) metres by which the root goes down so that no leg is stretched too far (`_overreach`)."""
-    need = np.maximum(*(_overreach(places, targets, i) for i in (0, 1)))
-    return envelope(need.clip(0, 0.05), round(0.15 * fps))
 
 
 def _overreach(places: Array, targets: Array, i: int) -> Array:
@@ -277,7 +278,7 @@ def _overreach(places: Array, targets: Array, i: int) -> Array:
 
 
 def _with_legs(motion: Motion, places: Array, targets: Array, directions: Array) -> Motion:
-    """The motion with its root at ``places[:, 0]`` and ankles and feet as wanted (frames, 2, 3)."""
+    """The motion with its root at ``places[:, 0]`` and ankles and feet at these (frames, 2, 3)."""
     world, rotations = motion.world_rotations(), motion.rotations.copy()
     for i, limb in enumerate(LIMBS[:2]):
         a, b, c = limb.start, limb.middle, limb.end
@@ -295,15 +296,15 @@ def _solve_leg(limb: Limb, world: Array, places: Array, target: Array) -> tuple[
     start, lengths = places[:, a], (_LENGTHS[b], _LENGTHS[c])
     old, new = places[:, c] - start, target - start
     # never straighter than it was, unless it stays visibly bent: the knee's angle is wild near full reach
-    before, wanted = np.linalg.norm(old, axis=-1), np.linalg.norm(new, axis=-1)
+    before, after = np.linalg.norm(old, axis=-1), np.linalg.norm(new, axis=-1)
     bent = np.maximum(before, 0.995 * sum(lengths))
     room = (np.maximum(before, 0.999 * sum(lengths)) - bent).clip(1e-6)
-    far = (wanted - bent).clip(0)
-    distance = np.where(far > 0, bent + room * np.tanh(far / room), wanted)
-    target = start + new * (distance / wanted.clip(1e-9))[:, None]
-    seen = places[:, [a, b, c]]
+    far = (after - bent).clip(0)
+    distance = np.where(far > 0, bent + room * np.tanh(far / room), after)
+    target = start + new * (distance / after.clip(1e-9))[:, None]
+    leg = places[:, [a, b, c]]
     hinge = np.array(limb.hinge, dtype=np.float64)
     arc = rot.shortest_arc(old, new)
     axes = [rot.rotate(arc, rot.rotate(world[:, j], hinge)) for j in (a, b)]
-    knee, ankle = reach(start, target, seen, axes[0], lengths)
+    knee, ankle = reach(start, target, leg, axes[0], lengths)
     return hinge_frame(limb, b, knee - start, axes[0]), hinge_frame(limb, c, ankle - knee, axes[1])

@@ -1,4 +1,4 @@
-"""Where a head looks: it is turned to a place after the motion is made, as far as a neck can."""
+"""Where a head looks: it is turned to a place after the motion is generated, as far as a neck can."""
 
 from dataclasses import replace
 
@@ -47,8 +47,8 @@ def looking(motion: Motion, points: Array, weights: Array) -> Motion:
     Raises:
         MotionloomError: for a skeleton without a head that turns.
     """
-    head, _, seen = _seen(motion)
-    side, rise = _angles(rot.rotate(rot.inverse(seen), points - motion.positions()[:, head]))
+    head, _, chest = _neck(motion)
+    side, rise = _angles(rot.rotate(rot.inverse(chest), points - motion.positions()[:, head]))
     share = 1 - smoothstep((np.abs(side) - BEHIND[0]) / (BEHIND[1] - BEHIND[0]))
     return _aimed(motion, np.clip(side, -TURN, TURN), np.clip(rise, -NOD, NOD), weights * share)
 
@@ -64,7 +64,7 @@ def turned(motion: Motion, left: Array, up: Array) -> Motion:
     Raises:
         MotionloomError: for a skeleton without a head that turns.
     """
-    side, rise = _angles(rot.rotate(rot.inverse(_seen(motion)[2]), looks(motion)))
+    side, rise = _angles(rot.rotate(rot.inverse(_neck(motion)[2]), looks(motion)))
     side, rise = (
         np.clip(now + more, np.minimum(now, -most), np.maximum(now, most))
         for now, more, most in ((side, left, TURN), (rise, up, NOD))
@@ -72,7 +72,7 @@ def turned(motion: Motion, left: Array, up: Array) -> Motion:
     return _aimed(motion, side, rise, np.any([left, up], axis=0).astype(float))
 
 
-def _seen(motion: Motion) -> tuple[int, int | None, Array]:
+def _neck(motion: Motion) -> tuple[int, int | None, Array]:
     """The joints of the head and of a neck that turns it, and the frame (frames, 4) of the chest below them."""
     body = read_body(motion.skeleton)
     head, neck = body.drivers[15], body.drivers[12]
@@ -91,17 +91,17 @@ def _joint_turned(motion: Motion, joint: int, turn: Array) -> Motion:
     return replace(motion, rotations=rot.unroll(rotations))
 
 
-def _angles(seen: Array) -> tuple[Array, Array]:
+def _angles(directions: Array) -> tuple[Array, Array]:
     """Radians to the left and up (frames,) of directions (frames, 3) in the frame of the chest."""
-    up, left, back = np.moveaxis(seen, -1, 0)
+    up, left, back = np.moveaxis(directions, -1, 0)
     return np.arctan2(left, -back), np.arctan2(up, np.hypot(left, back))
 
 
 def _aimed(motion: Motion, side: Array, rise: Array, weights: Array) -> Motion:
     """The motion with its head turned to so many radians to the left and up of the chest's front."""
-    head, neck, seen = _seen(motion)
+    head, neck, chest = _neck(motion)
     aim = np.stack([np.sin(rise), np.cos(rise) * np.sin(side), -np.cos(rise) * np.cos(side)], axis=-1)
-    turn = rot.quat_to_rotvec(rot.shortest_arc(looks(motion), rot.rotate(seen, aim))) * weights[:, None]
+    turn = rot.quat_to_rotvec(rot.shortest_arc(looks(motion), rot.rotate(chest, aim))) * weights[:, None]
     parts = [head] if neck is None else [neck, head]
     for joint in parts:
         motion = _joint_turned(motion, joint, rot.rotvec_to_quat(turn / len(parts)))

@@ -1,7 +1,7 @@
 """Joint positions to true rotations: an analytic body for export, with constant bones and without twist pops.
 
 Positions leave two things open: bones of a network's positions change length by centimetres, and the turn of a limb
-about its own length is visible only while its hinge (elbow, knee) is bent. Lengths are settled by the skeleton;
+about its own length is visible only while its hinge (elbow, knee) is bent. Lengths are those of the skeleton;
 the turn of a limb is the solution of one smoothing problem over the whole clip, see `hinge_axes`.
 """
 
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.blending import smoothstep
-from motionloom.errors import MotionloomError
+from motionloom.features.humanml import checked
 from motionloom.motion import Motion
+from motionloom.retarget.limbs import local_rotations
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
@@ -34,8 +35,8 @@ class Limb:
 
 
 def _limb(base: str, names: tuple[str, str, str], hinge: tuple[float, float, float], tip: str | None = None) -> Limb:
-    base_joint, start, middle, end = map(SMPL22.index, (base, *names))
-    return Limb(base_joint, start, middle, end, hinge, None if tip is None else SMPL22.index(tip))
+    joints = map(SMPL22.index, (base, *names))
+    return Limb(*joints, hinge=hinge, tip=None if tip is None else SMPL22.index(tip))
 
 
 LIMBS: tuple[Limb, ...] = (
@@ -64,24 +65,20 @@ _TOLERANCE = 0.12
 def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
     """The 22-joint person who takes the given places as well as constant bones can.
 
-    ``positions`` (frames, 22, 3) in metres, of a person of about the size of `motionloom.skeleton.SMPL22` (put others
+    ``positions`` (frames, 22, 3) in metres, of a person of about the size of `motionloom.skeleton.SMPL22` (pass others
     through `motionloom.features.humanml.uniform` first); bones may breathe. Wrists and ankles reach their places when
     the limb is long enough; rotations are continuous in time, signs too. Raises `MotionloomError` for other shapes
     and numbers that are not finite.
     """
-    positions = np.asarray(positions, dtype=np.float64)
-    if positions.ndim != 3 or positions.shape[1:] != (22, 3) or len(positions) == 0:
-        raise MotionloomError(f"positions must be (frames, 22, 3) with at least one frame; got {positions.shape}")
-    if not np.isfinite(positions).all():
-        raise MotionloomError("the positions have numbers that are not finite (NaN or infinity)")
-    positions = _with_knees_ahead(positions)
+    positions = _with_knees_ahead(checked(positions))
     places = np.zeros_like(positions)
     world = np.tile(rot.IDENTITY, (len(positions), 22, 1))
     _solve_trunk(positions, places, world)
     solve_limbs(positions, places, world, fps)
     for ankle, toe in ((7, 10), (8, 11)):
         places[:, toe] = places[:, ankle] + rot.rotate(world[:, ankle], _REST[toe])
-    return Motion(SMPL22, fps, places[:, 0], _smooth_limbs(positions, local_rotations(world)))
+    rotations = _smooth_limbs(positions, local_rotations(SMPL22, world))
+    return Motion(SMPL22, fps, places[:, 0], rotations)
 
 
 def _with_knees_ahead(positions: Array) -> Array:
@@ -101,38 +98,30 @@ def _with_knees_ahead(positions: Array) -> Array:
     return result
 
 
-def local_rotations(world: np.ndarray) -> Array:
-    """World orientations (frames, 22, 4) to each joint's in its parent's frame, without sign flips in time."""
-    parents = list(SMPL22.parents[1:])
-    local = np.array(world)
-    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
-    return rot.unroll(rot.normalize(local))
-
-
 # Trunk
 
 
-def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
+def _solve_trunk(goal: Array, places: Array, world: Array) -> None:
     """Fill in places and world orientations of pelvis, spine, neck, head and collars."""
-    world[:, 0] = _smooth_by_confidence(_pelvis(seen), _length_error(seen[:, 1] - seen[:, 2], _REST[1] - _REST[2]))
+    world[:, 0] = _smooth_by_confidence(_pelvis(goal), _length_error(goal[:, 1] - goal[:, 2], _REST[1] - _REST[2]))
     chest = [12, 13, 14]
-    spare = (_REST[13] - _REST[14], seen[:, 13] - seen[:, 14])
-    turned = fit_rotation(_REST[chest], seen[:, chest] - seen[:, 9:10], spare=spare)
+    spare = (_REST[13] - _REST[14], goal[:, 13] - goal[:, 14])
+    turned = fit_rotation(_REST[chest], goal[:, chest] - goal[:, 9:10], spare=spare)
     world[:, 9] = _smooth_by_confidence(turned, _length_error(spare[1], spare[0]))
     for joint, share in ((3, 1 / 3), (6, 2 / 3)):
         child = SMPL22.children(joint)[0]
-        expected = rot.slerp(world[:, 0], world[:, 9], np.full(len(seen), share))
-        world[:, joint] = aim(expected, _REST[child], _smooth_bones(seen[:, child] - seen[:, joint], expected, child))
+        expected = rot.slerp(world[:, 0], world[:, 9], np.full(len(goal), share))
+        world[:, joint] = aim(expected, _REST[child], _smooth_bones(goal[:, child] - goal[:, joint], expected, child))
     trunk = (3, 6, 9, 12, 13, 14, 1, 2)
     for joint in trunk:
         places[:, joint] = _end_of(joint, places, world)
     # The trunk's joints need not lie to each other as the skeleton's do: share the error out instead of leaving it all
     # to those far from the pelvis.
     weights = np.array([1.0, 1, 1, 1, 2, 0, 0, 2, 2])
-    shift = np.einsum("j,fjk->fk", weights / weights.sum(), (seen - places)[:, (0, *trunk)])
+    shift = np.einsum("j,fjk->fk", weights / weights.sum(), (goal - places)[:, (0, *trunk)])
     places[:, (0, *trunk)] += shift[:, None]
     for joint, child in ((12, 15), (13, 16), (14, 17)):
-        sampled = seen[:, child] - places[:, joint]
+        sampled = goal[:, child] - places[:, joint]
         error = _length_error(sampled, _REST[child])
         usual = rot.rotate(world[:, 9], np.broadcast_to(_REST[child], sampled.shape))
         turned = aim(world[:, 9], _REST[child], sampled + 2 * error[:, None] * usual)
@@ -146,7 +135,7 @@ def _level_head(chest: Array, neck: Array) -> Array:
     """(4,) turn of the head on the neck, the same for all frames.
 
     The head nods with the neck's bone, but how steep that bone is in a person who looks ahead depends on where a body
-    model puts its joints: a bone that leans back all the time (up to 50 degrees) means a level head.
+    model has its joints: a bone that leans back all the time (up to 50 degrees) means a level head.
     """
     up = rot.rotate(rot.multiply(rot.inverse(chest), neck), np.array([0.0, 1.0, 0.0]))
     lean = float(np.clip(np.median(np.arctan2(up[:, 2], up[:, 1])), -np.radians(50), 0))
@@ -154,7 +143,7 @@ def _level_head(chest: Array, neck: Array) -> Array:
 
 
 def _smooth_bones(bone: Array, expected: Array, child: int) -> Array:
-    """The seen bone (frames, 3), mixed with the expected one as far as its breathing length shows noise."""
+    """The sampled bone (frames, 3), mixed with the expected one as far as its breathing length shows noise."""
     length = np.linalg.norm(bone, axis=-1)
     noise = float(np.std(length) / _LENGTHS[child])
     return bone + min(2.0, 6.0 * noise) * rot.rotate(expected, np.broadcast_to(_REST[child], bone.shape))
@@ -178,10 +167,10 @@ def _smooth_by_confidence(turns: Array, error: Array) -> Array:
     return rot.normalize(_tridiagonal(weight, 1.0, weight * rot.unroll(turns)))
 
 
-def _pelvis(seen: Array) -> Array:
+def _pelvis(goal: Array) -> Array:
     bones = [1, 2, 3]
-    spare = (_REST[16] + _REST[13] - _REST[17] - _REST[14], seen[:, 16] - seen[:, 17])
-    return fit_rotation(_REST[bones], seen[:, bones] - seen[:, :1], spare=spare)
+    spare = (_REST[16] + _REST[13] - _REST[17] - _REST[14], goal[:, 16] - goal[:, 17])
+    return fit_rotation(_REST[bones], goal[:, bones] - goal[:, :1], spare=spare)
 
 
 def _end_of(joint: int, places: Array, world: Array) -> Array:
@@ -189,19 +178,19 @@ def _end_of(joint: int, places: Array, world: Array) -> Array:
     return places[:, parent] + rot.rotate(world[:, parent], _REST[joint])
 
 
-def fit_rotation(rest: np.ndarray, seen: np.ndarray, *, spare: tuple[np.ndarray, np.ndarray]) -> Array:
-    """World quaternions (frames, 4) that best turn ``rest`` (points, 3) into ``seen`` (frames, points, 3).
+def fit_rotation(rest: np.ndarray, places: np.ndarray, *, spare: tuple[np.ndarray, np.ndarray]) -> Array:
+    """World quaternions (frames, 4) that best turn ``rest`` (points, 3) into ``places`` (frames, points, 3).
 
     Kabsch, *Acta Cryst.* A32 (1976). Where the points lie on a line (left and right hip coincide), the ``spare`` pair
-    of vectors, rest (3,) and seen (frames, 3), gives the rest; elsewhere it has no say.
+    of vectors, at rest (3,) and now (frames, 3), gives the remainder; elsewhere it has no effect.
     """
     full = np.linalg.svd(rest.T @ rest)[1][1]
-    correlation = seen.swapaxes(-1, -2) @ rest
+    correlation = places.swapaxes(-1, -2) @ rest
     weakness = 1 - 2 * np.linalg.svd(correlation)[1][:, 1] / full
     extra = spare[1][:, :, None] * spare[0]
     extra /= np.linalg.norm(extra, axis=(-2, -1), keepdims=True).clip(1e-9)
     u, _, vt = np.linalg.svd(correlation + 0.5 * full * weakness.clip(0)[:, None, None] * extra)
-    signs = np.ones((len(seen), 3))
+    signs = np.ones((len(places), 3))
     signs[:, 2] = np.linalg.det(u @ vt)
     return rot.matrix_to_quat((u * signs[:, None]) @ vt)
 
@@ -216,21 +205,21 @@ def aim(orientation: np.ndarray, rest: np.ndarray, direction: np.ndarray) -> Arr
 # Limbs
 
 
-def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: float) -> None:
+def solve_limbs(goal: np.ndarray, places: np.ndarray, world: np.ndarray, fps: float) -> None:
     """Fill in places and world orientations of the arms and legs, feet included.
 
-    ``seen`` (frames, 22, 3) are the places wanted; ``places`` and ``world`` (frames, 22, ...) hold the solved trunk
+    ``goal`` (frames, 22, 3) are the places to reach; ``places`` and ``world`` (frames, 22, ...) hold the solved trunk
     with hips and shoulders and receive the rest.
     """
-    axes = hinge_axes(seen, world, fps)
+    axes = hinge_axes(goal, world, fps)
     for limb, axis in zip(LIMBS, axes):
         a, b, c = limb.start, limb.middle, limb.end
-        places[:, b], places[:, c] = two_bones(places[:, a], seen[:, [a, b, c]], axis, (_LENGTHS[b], _LENGTHS[c]))
+        places[:, b], places[:, c] = two_bones(places[:, a], goal[:, [a, b, c]], axis, (_LENGTHS[b], _LENGTHS[c]))
         world[:, a] = hinge_frame(limb, b, places[:, b] - places[:, a], axis)
         world[:, b] = hinge_frame(limb, c, places[:, c] - places[:, b], axis)
         world[:, c] = world[:, b]
         if limb.tip is not None:
-            world[:, c] = aim(world[:, b], _REST[limb.tip], seen[:, limb.tip] - seen[:, c])
+            world[:, c] = aim(world[:, b], _REST[limb.tip], goal[:, limb.tip] - goal[:, c])
             world[:, limb.tip] = world[:, c]  # places do not show how toes are bent: they go with the foot
 
 
@@ -261,52 +250,52 @@ def hinge_frame(limb: Limb, child: int, bone: np.ndarray, axis: np.ndarray) -> A
 
 
 def two_bones(
-    start: np.ndarray, seen: np.ndarray, axis: np.ndarray, lengths: tuple[float, float]
+    start: np.ndarray, goal: np.ndarray, axis: np.ndarray, lengths: tuple[float, float]
 ) -> tuple[Array, Array]:
     """Places of the middle and the end (frames, 3) of a limb that begins at ``start`` and has bones of given lengths.
 
-    ``seen`` (frames, 3, 3) are the wanted places of start, middle and end, ``axis`` (frames, 3) the hinge. The end
+    ``goal`` (frames, 3, 3) are the places to reach of start, middle and end, ``axis`` (frames, 3) the hinge. The end
     reaches its place; near full reach the observed bend decides how far it gets instead (exactly the same for bones of
     the right length), since there a millimetre of distance is many degrees of bend.
     """
     first, second = lengths
-    upper, lower = _unit(seen[:, 1] - seen[:, 0]), _unit(seen[:, 2] - seen[:, 1])
+    upper, lower = _unit(goal[:, 1] - goal[:, 0]), _unit(goal[:, 2] - goal[:, 1])
     bend = (upper * lower).sum(-1).clip(-1, 1)
     by_bend = np.sqrt((first**2 + second**2 + 2 * first * second * bend).clip(0))
-    wanted = seen[:, 2] - start
-    distance = np.linalg.norm(wanted, axis=-1)
+    line = goal[:, 2] - start
+    distance = np.linalg.norm(line, axis=-1)
     near = _between(distance / (first + second), _NEARLY_STRAIGHT)
-    return reach(start, start + _unit(wanted) * (distance + near * (by_bend - distance))[:, None], seen, axis, lengths)
+    return reach(start, start + _unit(line) * (distance + near * (by_bend - distance))[:, None], goal, axis, lengths)
 
 
 def reach(
-    start: np.ndarray, target: np.ndarray, seen: np.ndarray, axis: np.ndarray, lengths: tuple[float, float]
+    start: np.ndarray, target: np.ndarray, pose: np.ndarray, axis: np.ndarray, lengths: tuple[float, float]
 ) -> tuple[Array, Array]:
     """Places of middle and end of a limb from ``start`` to ``target``, or as near as the bones allow.
 
-    The middle lies on the side of the line where it is ``seen``, in the limb's seen plane; as far as it must leave the
-    line more than seen, it does so about the hinge ``axis``.
+    The middle lies on the side of the line, and in the plane, where ``pose`` (frames, 3, 3), places of start, middle
+    and end, has it; as far as it must leave the line more than there, it does so about the hinge ``axis``.
     """
     first, second = lengths
     line = _unit(target - start)
     distance = np.linalg.norm(target - start, axis=-1).clip(abs(first - second) + 1e-6, first + second)
     along = (first**2 + distance**2 - second**2) / (2 * distance)
     off = np.sqrt((first**2 - along**2).clip(0))
-    middle = start + along[:, None] * line + off[:, None] * _side(seen, line, axis, off)
+    middle = start + along[:, None] * line + off[:, None] * _side(pose, line, axis, off)
     return middle, start + distance[:, None] * line
 
 
-def _side(seen: Array, line: Array, axis: Array, off: Array) -> Array:
+def _side(pose: Array, line: Array, axis: Array, off: Array) -> Array:
     """Unit vectors (frames, 3) across ``line`` towards the middle joint."""
-    chord = _unit(seen[:, 2] - seen[:, 0])
-    across = seen[:, 1] - seen[:, 0]
+    chord = _unit(pose[:, 2] - pose[:, 0])
+    across = pose[:, 1] - pose[:, 0]
     across = across - (across * chord).sum(-1, keepdims=True) * chord
     across = rot.rotate(rot.shortest_arc(chord, line), across)
     missing = (off - np.linalg.norm(across, axis=-1)).clip(0) + 2e-4
     return _perpendicular(across + missing[:, None] * _unit(np.cross(line, axis)), line)
 
 
-def hinge_axes(seen: np.ndarray, world: np.ndarray, fps: float) -> Array:
+def hinge_axes(goal: np.ndarray, world: np.ndarray, fps: float) -> Array:
     """World hinge axes (limbs, frames, 3) of the four limbs, across their upper bones and smooth in time.
 
     In the frame of the limb's base (pelvis, chest) a vector is carried along the upper bone without twist (parallel
@@ -320,7 +309,7 @@ def hinge_axes(seen: np.ndarray, world: np.ndarray, fps: float) -> Array:
 
     def bones(a: str, b: str) -> Array:
         ends = [getattr(limb, b) for limb in LIMBS]
-        return _unit(rot.rotate(local, seen[:, ends] - seen[:, [getattr(limb, a) for limb in LIMBS]]))
+        return _unit(rot.rotate(local, goal[:, ends] - goal[:, [getattr(limb, a) for limb in LIMBS]]))
 
     upper, lower = bones("start", "middle"), bones("middle", "end")
     first = transport(upper)
@@ -330,14 +319,14 @@ def hinge_axes(seen: np.ndarray, world: np.ndarray, fps: float) -> Array:
         return (v * first).sum(-1) + 1j * (v * second).sum(-1)
 
     bend = plane(np.cross(upper, lower))
-    usual = plane(_usual_axes(seen, upper, lower, local))
+    usual = plane(_usual_axes(goal, upper, lower, local))
     strength = _between(np.abs(bend), _BENT)
     angle = _smooth_angles(bend, strength, usual, _STIFFNESS * (fps / 20) ** 2)
     axes = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
     return rot.rotate(world[:, bases], axes).swapaxes(0, 1)
 
 
-def _usual_axes(seen: Array, upper: Array, lower: Array, local: Array) -> Array:
+def _usual_axes(goal: Array, upper: Array, lower: Array, local: Array) -> Array:
     """Where hinges point when no bend is seen (frames, limbs, 3): rest axis carried by the shortest arc; the foot."""
     axes = np.empty_like(upper)
     for i, limb in enumerate(LIMBS):
@@ -346,7 +335,7 @@ def _usual_axes(seen: Array, upper: Array, lower: Array, local: Array) -> Array:
         # the shortest arc has no answer for a limb that points against its rest direction
         axes[:, i] *= (1.1 + (_unit(rest) * upper[:, i]).sum(-1, keepdims=True)).clip(0, 1)
         if limb.tip is not None:
-            foot = rot.rotate(local[:, i], _unit(seen[:, limb.tip] - seen[:, limb.end]))
+            foot = rot.rotate(local[:, i], _unit(goal[:, limb.tip] - goal[:, limb.end]))
             along, aside = _across(_unit(_REST[limb.tip]), _unit(_REST[limb.end]))
             hinge = np.array(limb.hinge, dtype=np.float64)
             forward, lateral = _across(foot, lower[:, i])
@@ -361,7 +350,7 @@ def _across(foot: Array, shin: Array) -> tuple[Array, Array]:
 
 def transport(directions: np.ndarray) -> Array:
     """Unit vectors across ``directions`` (frames, ..., 3), carried from frame to frame by the shortest arc."""
-    start = np.where(np.abs(directions[0, ..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    start = np.where(np.abs(directions[0, ..., :1]) < 0.9, [1, 0, 0], [0, 1, 0])
     result = np.empty_like(directions)
     result[0] = _perpendicular(start, directions[0])
     steps = rot.quat_to_matrix(rot.shortest_arc(directions[:-1], directions[1:])) if len(directions) > 1 else []

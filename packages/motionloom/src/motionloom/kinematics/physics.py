@@ -21,7 +21,7 @@ TOES = (J["left_foot"], J["right_foot"])
 ANKLES = (J["left_ankle"], J["right_ankle"])
 FEET = (*ANKLES, *TOES)
 WRISTS = (J["left_wrist"], J["right_wrist"])
-_BONES = tuple((p, j) for j, p in enumerate(SMPL22.parents) if p >= 0)
+_PARENTS = list(SMPL22.parents[1:])
 
 
 def smooth(values: np.ndarray, frames: int) -> Array:
@@ -185,11 +185,11 @@ def jerk(positions: np.ndarray, fps: float) -> Jerk:
 def bone_lengths(positions: np.ndarray) -> Array:
     """(frames, 21) metres: length of each bone, by child joint 1..21."""
     p = np.asarray(positions, dtype=np.float64)
-    return np.stack([np.linalg.norm(p[:, child] - p[:, parent], axis=-1) for parent, child in _BONES], axis=-1)
+    return np.linalg.norm(p[:, 1:] - p[:, _PARENTS], axis=-1)
 
 
 def bone_length_error(positions: np.ndarray, *, lengths: np.ndarray | None = None) -> float:
     """Metres: mean absolute difference of the bones from ``lengths`` (21,), or from their own median over the clip."""
-    found = bone_lengths(positions)
-    wanted = np.median(found, axis=0) if lengths is None else np.asarray(lengths)
-    return float(np.abs(found - wanted).mean())
+    bones = bone_lengths(positions)
+    expected = np.median(bones, axis=0) if lengths is None else np.asarray(lengths)
+    return float(np.abs(bones - expected).mean())

@@ -84,14 +84,14 @@ def footholds(positions: np.ndarray, fps: float) -> list[Foothold]:
     """Where a foot is slow and nothing but the other foot is 5 cm lower, in the order of time."""
     p = np.asarray(positions, dtype=np.float64)
     others = np.delete(p, [*ANKLES, *TOES], axis=1)[..., 1].min(axis=1)
-    found = []
+    holds = []
     for side, (toe, ankle) in enumerate(zip(TOES, ANKLES, strict=True)):
         slow = np.linalg.norm(smooth(velocity(p[:, ankle], fps), 3), axis=-1) < _SLOW
         height = np.minimum(p[:, toe, 1], p[:, ankle, 1])
         for first, end in true_spans(slow & (height < others + 0.05)):
             if end - first >= 0.15 * fps:
-                found.append(Foothold(side, first, end, float(np.median(p[first:end, toe, 1]))))
-    return sorted(found, key=lambda hold: hold.first + hold.end)
+                holds.append(Foothold(side, first, end, float(np.median(p[first:end, toe, 1]))))
+    return sorted(holds, key=lambda hold: hold.first + hold.end)
 
 
 def hovering(positions: np.ndarray, fps: float) -> list[tuple[int, int]]:

@@ -1,6 +1,6 @@
 """Whether a body is a person's: the pelvis in line with the trunk, the trunk as long as it is, joints within limits.
 
-A motion may do all that was asked with a body that nobody has: the pelvis folded back under a trunk that is half as
+A motion may do all that its words say with a body that nobody has: the pelvis folded back under a trunk that is half as
 long, a knee that bends forwards. Limits are those of recorded people in all they do, lying, crawling, sitting, bowing
 and cartwheels included (docs/evaluate.md), with a little room.
 
@@ -103,7 +103,7 @@ def broken_frames(positions: np.ndarray) -> dict[str, NDArray[np.bool_]]:
     bent = (at_hips > BENT) | (lean > UPRIGHT)
     length = np.linalg.norm(head - hips, axis=-1)
     below, hang = _below_neck(p, back)
-    found = {
+    faults = {
         "pelvis": (bend.pelvis > np.where(bent, PELVIS_BENT, PELVIS)) & (rise > SHORT * back),
         "trunk": np.linalg.norm(trunk, axis=-1) < TRUNK * back,
         "head": (length < HEAD * back) | ((lean < UPRIGHT) & ((head - hips)[:, 1] < ABOVE * back)),
@@ -111,7 +111,7 @@ def broken_frames(positions: np.ndarray) -> dict[str, NDArray[np.bool_]]:
         "elbows": (bend.elbows > ELBOW).any(axis=1),
         "shoulders": hang & (below > LOWEST_SHOULDERS * back),
     }
-    return {name: np.asarray(frames, dtype=np.bool_) for name, frames in found.items()}
+    return {name: np.asarray(frames, dtype=np.bool_) for name, frames in faults.items()}
 
 
 def wholeness(positions: np.ndarray) -> float:

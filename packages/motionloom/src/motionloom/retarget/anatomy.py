@@ -96,12 +96,13 @@ class Body:
     @property
     def broad(self) -> float:
         """Metres by which each hip joint is further out than on any human body; 0 on those."""
-        return max(0.0, float(np.linalg.norm(self.rest[1] - self.rest[2])) - BROADEST * self.leg) / 2
+        apart = float(np.linalg.norm(hips_line(self.rest)))
+        return max(0.0, apart - BROADEST * self.leg) / 2
 
     @property
     def leg(self) -> float:
         """Metres of thigh and shin, mean of both sides."""
-        return float(np.mean([self.bone(1) + self.bone(4), self.bone(2) + self.bone(5)]))
+        return (self.bone(1) + self.bone(4) + (self.bone(2) + self.bone(5))) / 2
 
     @property
     def breadth(self) -> float:
@@ -115,12 +116,12 @@ class Body:
 
     def places(self, positions: Array, world: Array) -> Array:
         """(frames, 22, 3): the SMPL joints, of the joints' positions and world rotations (frames, joints, 3 and 4)."""
-        found = np.einsum("sj,fjc->fsc", self.points, positions)
+        places = np.einsum("sj,fjc->fsc", self.points, positions)
         for j in np.flatnonzero(np.abs(self.tips).max(axis=1)):
             driver = self.drivers[j]
             assert driver is not None
-            found[:, j] += rot.rotate(world[:, driver], self.tips[j][None])
-        return found
+            places[:, j] += rot.rotate(world[:, driver], self.tips[j][None])
+        return places
 
     def bone(self, joint: int) -> float:
         """Metres from an SMPL joint to the one its bone runs to."""
@@ -131,7 +132,7 @@ class Body:
 
 
 _LAST: deque[tuple[Skeleton, Body]] = deque(maxlen=8)
-"""Of skeletons that many motions are put on, such as the uniform person's."""
+"""Of skeletons to which many motions are retargeted, such as the uniform person's."""
 
 
 def read_body(skeleton: Skeleton, override: Override | None = None, *, poses: Poses | None = None) -> Body:
@@ -152,10 +153,10 @@ def read_body(skeleton: Skeleton, override: Override | None = None, *, poses: Po
 
 def _read_body(skeleton: Skeleton, override: Override | None, poses: Poses | None) -> Body:
     poses = poses or skeleton.poses
-    found = joint_map(skeleton, override)
-    points = found.matrix(skeleton)
+    joints = joint_map(skeleton, override)
+    points = joints.matrix(skeleton)
     rest = points @ skeleton.rest_positions()
-    _check_legs(skeleton, found, rest)
+    _check_legs(skeleton, joints, rest)
     tips = _missing_toes(rest)
     rest = rest + tips
     if override is None and _on_four_legs(rest):
@@ -163,34 +164,33 @@ def _read_body(skeleton: Skeleton, override: Override | None, poses: Poses | Non
             "the skeleton is no person but an animal on four legs: at rest its spine lies along the ground and its "
             "arms reach it; name its joints in a joint map to read it as a person all the same"
         )
-    axes, drivers = _rest_axes(rest), found.drivers(skeleton)
+    axes, drivers = _rest_axes(rest), joints.drivers(skeleton)
     frames = _odd_frames(rest) if axes is None else _rest_frames(rest, axes)
-    resting = _on_chest(skeleton, drivers, frames, rest)
-    body = Body(skeleton, points, drivers, rest, frames, axes is not None, resting, tips)
+    chest = _on_chest(skeleton, drivers, frames, rest)
+    body = Body(skeleton, points, drivers, rest, frames, axes is not None, chest, tips)
     if axes is None:
         return body if poses is None else _measured(body, poses)
     # of the uniform person, whose legs differ by millimetres, it is measured, as when the weights were trained
     upright = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
     toes = rest[list(TOES), 1]
     planted = float(toes.mean() if _lifted_foot(rest, axes) is None else toes.min())
-    height = planted if upright else _toe_height(skeleton, found, rest, axes[1])
+    height = planted if upright else _toe_height(skeleton, joints, rest, axes[1])
     body = replace(body, up=axes[1], toe_height=height)
-    return body if poses is None or skeleton.on_floor else _on_measured_feet(body, poses)
+    return body if poses is None or skeleton.on_floor else _measured_feet(body, poses)
 
 
 def _measured(body: Body, poses: Poses) -> Body:
     """The body with all frames measured from poses."""
-    places, world = _posed(body, poses)
+    places, world, joints = _posed(body, poses)
     frames = measure_frames(places, world, body.drivers, body.frames)
     body = replace(body, frames=frames, measured=True)
     chest = body.drivers[CHEST]
     if chest is None:
         return body
-    joint = Motion(body.skeleton, 30.0, poses.root, poses.rotations, poses.translations).positions()[:, chest]
     turned = rot.inverse(rot.multiply(world[:, chest], body.frames[CHEST]))
-    seen = rot.rotate(turned[:, None], places[:, SHOULDERS] - joint[:, None])
+    local = rot.rotate(turned[:, None], places[:, SHOULDERS] - joints[:, chest, None])
     weights = arms_hang(places)[..., None]
-    return replace(body, shoulders=(weights * seen).sum(axis=0) / weights.sum(axis=0))
+    return replace(body, shoulders=(weights * local).sum(axis=0) / weights.sum(axis=0))
 
 
 def _on_chest(skeleton: Skeleton, drivers: Sequence[int | None], frames: Array, rest: Array) -> Array:
@@ -201,32 +201,33 @@ def _on_chest(skeleton: Skeleton, drivers: Sequence[int | None], frames: Array, 
     return np.asarray(rot.rotate(rot.inverse(frames[CHEST]), rest[list(SHOULDERS)] - joint), dtype=np.float64)
 
 
-def _on_measured_feet(body: Body, poses: Poses) -> Body:
+def _measured_feet(body: Body, poses: Poses) -> Body:
     """The body with the soles of those feet measured from poses that do not stand at rest, such as on the toes."""
     if body.up[1] < 0.9 or all(stands_on_flat_feet(body.rest, foot) for foot in FEET):
         return body
-    places, world = _posed(body, poses)
+    places, world, _ = _posed(body, poses)
     frames = body.frames.copy()
     for foot, toe in zip(FEET, TOES):
-        sole = measure_sole(places, world, body.drivers[foot], rest=body.rest, foot=foot)
+        driver = body.drivers[foot]
+        sole = measure_sole(places, world, driver, rest=body.rest, foot=foot)
         if sole is not None:
             frames[[foot, toe]] = sole
     return replace(body, frames=frames)
 
 
-def _posed(body: Body, poses: Poses) -> tuple[Array, Array]:
-    """Places (poses, 22, 3) of the SMPL joints and orientations (poses, joints, 4) of the skeleton's."""
-    motion = Motion(body.skeleton, 30.0, poses.root, poses.rotations, poses.translations)
-    world = motion.world_rotations()
-    return body.places(motion.positions(), world), world
+def _posed(body: Body, poses: Poses) -> tuple[Array, Array, Array]:
+    """Places (poses, 22, 3) of the SMPL joints; orientations (poses, joints, 4) and places of the skeleton's."""
+    motion = Motion(body.skeleton, 30.0, **vars(poses))
+    world, positions = motion.world_rotations(), motion.positions()
+    return body.places(positions, world), world, positions
 
 
 def _on_four_legs(rest: Array) -> bool:
     """Whether arms hang down beside the legs from a spine that is level."""
-    legs = (rest[[7, 8]] - rest[[1, 2]]).sum(axis=0)
-    arms = (rest[[20, 21]] - rest[[16, 17]]).sum(axis=0)
-    spine = rest[12] - rest[0]
-    return float(unit(legs) @ unit(arms)) > 0.8 and abs(float(unit(legs) @ unit(spine))) < 0.5
+    legs = unit((rest[[7, 8]] - rest[[1, 2]]).sum(axis=0))
+    arms = unit((rest[[20, 21]] - rest[[16, 17]]).sum(axis=0))
+    spine = unit(rest[12] - rest[0])
+    return float(legs @ arms) > 0.8 and abs(float(legs @ spine)) < 0.5
 
 
 def _missing_toes(rest: Array) -> Array:
@@ -244,12 +245,12 @@ def _missing_toes(rest: Array) -> Array:
     return tips
 
 
-def _check_legs(skeleton: Skeleton, found: JointMap, rest: Array) -> None:
-    drivers = found.drivers(skeleton)
+def _check_legs(skeleton: Skeleton, joints: JointMap, rest: Array) -> None:
+    drivers = joints.drivers(skeleton)
     for j in LEGS:
         child = CHILD[j]
         assert child is not None
-        if drivers[j] is None or drivers[j] == drivers[child] or drivers[j] == drivers[0]:
+        if drivers[j] in (None, drivers[child], drivers[0]):
             raise MotionloomError(
                 f"the joint map puts {SMPL22.names[j]} where no joint of its own bends the leg; name one joint for it"
             )
@@ -296,7 +297,7 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
     lifted = _lifted_foot(rest, axes)
     for side, (foot, toe) in enumerate(zip(FEET, TOES)):
         heading = rest[toe] - rest[foot]
-        if side == lifted:  # its sole slopes against the bone to the toe as the other's does
+        if side == lifted:  # its sole slopes against its bone as the other's does
             heading = rot.rotate(rot.rotvec_to_quat(-_slopes(rest, axes)[1 - side] * left), heading)
         else:
             heading = heading - float(heading @ up) * up
@@ -311,8 +312,9 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
 def _slopes(rest: Array, axes: tuple[Array, Array, Array]) -> tuple[float, float]:
     """Radians by which the bones from the ankles to the toes point down, left and right."""
     _, up, forward = axes
-    left, right = rest[list(TOES)] - rest[list(FEET)]
-    return tuple(float(np.arctan2(-bone @ up, bone @ forward)) for bone in (left, right))  # type: ignore[return-value]
+    bones = rest[list(TOES)] - rest[list(FEET)]
+    left, right = (float(np.arctan2(-bone @ up, bone @ forward)) for bone in bones)
+    return left, right
 
 
 def _lifted_foot(rest: Array, axes: tuple[Array, Array, Array]) -> int | None:
@@ -324,12 +326,12 @@ def _lifted_foot(rest: Array, axes: tuple[Array, Array, Array]) -> int | None:
     return None if abs(slopes[0] - slopes[1]) < _STEPPING else int(heights.argmax())
 
 
-def _toe_height(skeleton: Skeleton, found: JointMap, rest: Array, up: Array) -> float:
+def _toe_height(skeleton: Skeleton, joints: JointMap, rest: Array, up: Array) -> float:
     """From the ground to the toe joint on a flat foot; the ground is the lowest tip of the foot."""
     heights = skeleton.rest_positions() @ up
     depths = []
     for foot, toe in zip(FEET, TOES):
-        own = skeleton.below(*(skeleton.index(name) for name, _ in found.points[foot]))
+        own = skeleton.below(*(skeleton.index(name) for name, _ in joints.points[foot]))
         depths.append(max(float(rest[toe] @ up) - float(heights[own].min()), 0.0))
     return min(float(np.mean(depths)), 0.06)
 

@@ -34,7 +34,7 @@ _BENT = 0.15
 _SLOPES = np.radians((-10, 45))
 """By how much the bone to the toes points down on feet that are flat; a rest pose with others is on its toes."""
 _FOOT = 0.24
-"""Lengths of the shin: a shorter bone leads down to the ground below the ankle and not to the toes."""
+"""Lengths of the shin: a shorter bone runs down to the ground below the ankle and not to the toes."""
 _DOUBTFUL = 0.005
 """The weight of a frame that says little, beside 1: it counts where no frame says more."""
 
@@ -80,7 +80,7 @@ def trunk_frame(across: Array, along: Array) -> Array:
 def collar_frames(chest: Array) -> Array:
     """(..., 2, 4) the frames of both collars where shoulders rest on a chest (..., 4), as on the uniform person.
 
-    A collar bone is short, and skeletons put its ends in different places: what counts is how far it is from rest.
+    A collar bone is short, and skeletons have its ends in different places: what counts is how far it is from rest.
     """
     person = SMPL22.rest_positions()
     upright = frame(np.eye(3)[1], np.eye(3)[0])
@@ -95,7 +95,7 @@ def measure_frames(places: Array, world: Array, drivers: Sequence[int | None], o
     """(22, 4) joint_from_anatomy, the mean over a motion.
 
     places: (frames, 22, 3) metres, y up; world: (frames, joints, 4) the joints' orientations; drivers: per SMPL joint
-    the joint that turns it; otherwise: (22, 4) what stands for SMPL joints that nothing turns.
+    the joint that turns it; otherwise: (22, 4) the frames of SMPL joints that nothing turns.
     """
     frames, weights = frames_of_places(places)
     axes = otherwise.copy()
@@ -139,9 +139,9 @@ def frames_of_places(places: Array) -> tuple[Array, Array]:
         result[:, end] = result[:, lower]
         weights[:, [upper, lower, end]] = bend[:, None]
     for foot, toe in zip(FEET, TOES):
-        stands = _stands(places, foot)
-        result[:, foot] = result[:, toe] = np.where(stands[:, None], _level_sole(places, foot), _sole(places, foot))
-        weights[:, [foot, toe]] = np.where(stands, 1.0, _DOUBTFUL)[:, None]
+        flat = _flat(places, foot)
+        result[:, foot] = result[:, toe] = np.where(flat[:, None], _level_sole(places, foot), _sole(places, foot))
+        weights[:, [foot, toe]] = np.where(flat, 1.0, _DOUBTFUL)[:, None]
     return result, weights
 
 
@@ -150,19 +150,19 @@ def measure_sole(places: Array, world: Array, driver: int | None, *, rest: Array
 
     places: (frames, 22, 3) metres, y up; world: (frames, joints, 4) the joints' orientations; driver: the joint that
     turns the foot; rest: (22, 3) metres, a rest pose that is upright along y; foot: SMPL's number of the ankle. None
-    where the rest pose has flat feet, or where the foot never stands and its bone is too short to lead to toes.
+    where the rest pose has flat feet, or where the foot never stands and its bone is too short to run to toes.
     """
     if driver is None or stands_on_flat_feet(rest, foot):
         return None
-    stands = _stands(places, foot)
+    flat = _flat(places, foot)
     length = np.linalg.norm(rest[foot + 3] - rest[foot])
-    if stands.sum() >= 3:
+    if flat.sum() >= 3:
         world_soles = _level_sole(places, foot)
     elif length > _FOOT * np.linalg.norm(rest[foot] - rest[foot - 3]):
-        stands, world_soles = np.ones(len(places), dtype=bool), _sole(places, foot)
+        flat, world_soles = np.ones(len(places), dtype=bool), _sole(places, foot)
     else:
         return None
-    soles = rot.multiply(rot.inverse(world[stands, driver]), world_soles[stands])
+    soles = rot.multiply(rot.inverse(world[flat, driver]), world_soles[flat])
     return mean_rotation(soles, np.ones(len(soles)))
 
 
@@ -172,7 +172,7 @@ def stands_on_flat_feet(rest: Array, foot: int) -> bool:
     return bool(_SLOPES[0] < slope < _SLOPES[1])
 
 
-def _stands(places: Array, foot: int) -> NDArray[np.bool_]:
+def _flat(places: Array, foot: int) -> NDArray[np.bool_]:
     """(frames,) bool: ankle and toe are as low as they get, below an upright shin and a body that is up."""
     shin = places[:, foot - 3] - places[:, foot]
     bone = places[:, foot + 3] - places[:, foot]

@@ -9,7 +9,7 @@ in centimetres on a person with legs of `LEG` metres. Three things are no error 
   feet may stand where they stood, or legs point where they pointed: the better of the two counts.
 - How high over the sole a skeleton has its ankle. The recording's foot may point up or down by a constant, of at most
   `ANKLE` degrees.
-- Where a skeleton has the joint it calls pelvis. Where that is not between hips and trunk, the trunk stands for it.
+- Where a skeleton has the joint it calls pelvis. Where that is not between hips and trunk, the trunk takes its place.
 """
 
 from dataclasses import dataclass
@@ -90,15 +90,16 @@ class Fidelity:
     def faults(self) -> list[str]:
         """What is over the limits above, the worst first, in words; empty for a true copy."""
         over: list[tuple[float, str]] = []
-        for name, seen in self.directions.items():
+        for name, error in self.directions.items():
             median, high = {"all": DIRECTIONS, "pelvis": PELVIS}.get(name, DIRECTION)
-            worst = max(seen.median / median, seen.high / high)
+            worst = max(error.median / median, error.high / high)
             what = "all directions" if name == "all" else name
-            over.append((worst, f"{what} {seen.median:.1f} degrees off (95 %: {seen.high:.0f})"))
-        for name, seen in self.places.items():
-            off = min(seen.median, self.by_leg[name].median)
-            what, limit = ("all places", PLACES_CM) if name == "all" else (name, PLACE_CM)
-            over.append((off / limit, f"{what} {off:.1f} cm off"))
+            off = f"{error.median:.1f} degrees off (95 %: {error.high:.0f})"
+            over.append((worst, f"{what} {off}"))
+        for name, error in self.places.items():
+            cm = min(error.median, self.by_leg[name].median)
+            what, cap = ("all places", PLACES_CM) if name == "all" else (name, PLACE_CM)
+            over.append((cm / cap, f"{what} {cm:.1f} cm off"))
         return [text for worst, text in sorted(over, reverse=True) if worst >= 1]
 
 
@@ -135,14 +136,14 @@ def _direction_errors(theirs: Array, ours: Array) -> dict[str, Spread]:
         theirs[:, foot] = _bent_alike(theirs[:, [shin, foot]], ours[:, [shin, foot]])
     errors = _angle(theirs, ours)
     long = np.median(np.linalg.norm(theirs, axis=-1), axis=0) > _SHORT
-    kept = {name: [k for k in of if long[k]] for name, of in _OF.items() if any(long[k] for k in of)}
-    together = [k for name, of in kept.items() if name != "pelvis" for k in of]
-    return {name: _spread(errors[:, of]) for name, of in (kept | {"all": together}).items()}
+    lines = {name: [k for k in of if long[k]] for name, of in _OF.items() if any(long[k] for k in of)}
+    together = [k for name, of in lines.items() if name != "pelvis" for k in of]
+    return {name: _spread(errors[:, of]) for name, of in (lines | {"all": together}).items()}
 
 
 def _place_errors(theirs: Array, ours: Array) -> dict[str, Spread]:
     errors = 100 * LEG * np.linalg.norm(theirs - ours, axis=-1)
-    of = {name: [j for joint, j in _J.items() if joint.endswith(name)] for name in PLACES}
+    of = {name: [j for key, j in _J.items() if key.endswith(name)] for name in PLACES}
     of["all"] = [j for joints in of.values() for j in joints]
     return {name: _spread(errors[:, joints]) for name, joints in of.items()}
 
@@ -197,8 +198,8 @@ def _bent_alike(theirs: Array, ours: Array) -> Array:
 
     theirs, ours: (frames, 2, 3) shin and foot.
     """
-    more = np.median(_angle(ours[:, 0], ours[:, 1]) - _angle(theirs[:, 0], theirs[:, 1]))
-    turn = np.radians(np.clip(more, -ANKLE, ANKLE))
+    gap = np.median(_angle(ours[:, 0], ours[:, 1]) - _angle(theirs[:, 0], theirs[:, 1]))
+    turn = np.radians(np.clip(gap, -ANKLE, ANKLE))
     shin, foot = theirs[:, 0], theirs[:, 1]
     axis = np.cross(shin, foot)
     axis /= np.linalg.norm(axis, axis=-1, keepdims=True).clip(1e-9)
@@ -214,8 +215,8 @@ def _chains(places: Array, sizes: Array) -> Array:
     result = np.zeros_like(places)
 
     def part(start: tuple[str, ...], end: tuple[str, ...]) -> Array:
-        own, wanted = (_middle(p, end) - _middle(p, start) for p in (places, sizes))
-        lengths = [float(np.median(np.linalg.norm(line, axis=-1))) for line in (own, wanted)]
+        own, other = (_middle(p, end) - _middle(p, start) for p in (places, sizes))
+        lengths = [np.median(np.linalg.norm(line, axis=-1)) for line in (own, other)]
         return own * (lengths[1] / max(lengths[0], 1e-9))
 
     chest = part(_HIPS, _SHOULDERS)

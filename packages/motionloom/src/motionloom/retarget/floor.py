@@ -98,8 +98,9 @@ def _plane(toes: Array, planted: NDArray[np.bool_], *, level: bool = False) -> t
         total = weight.sum()
         left = np.einsum("ni,n,nj->ij", rows, weight, rows) + total * hold.T @ hold
         left += np.eye(4) * 1e-9 * total
-        # A foot never planted takes the other's level: the first row of `hold` says so.
-        answer = np.linalg.solve(left, np.einsum("ni,n,n->i", rows, weight, points[:, 1]))
+        # a foot never planted takes the other's level: the first row of `hold` says so
+        right = np.einsum("ni,n,n->i", rows, weight, points[:, 1])
+        answer = np.linalg.solve(left, right)
         weight = 1.0 / np.maximum(np.abs(points[:, 1] - rows @ answer), 0.003)
     slope = answer[2:]
     return answer[:2] - float(middle[[0, 2]] @ slope), slope

@@ -98,7 +98,8 @@ def _read_hand(body: Body, side: int) -> _Hand | None:
     elif thumb and float((rest[thumb[0]] - bases.mean(axis=0)) @ across) < 0:  # named from the other end
         fingers, across = fingers[::-1], -across
     across = across - float(across @ along) * along
-    if np.linalg.norm(across) < 1e-6 * max(body.leg, 1e-9) or np.linalg.norm(along) < 0.5:
+    tiny = 1e-6 * max(body.leg, 1e-9)
+    if np.linalg.norm(across) < tiny or np.linalg.norm(along) < 0.5:
         return None
     across = _unit(across)
     palm = np.cross(along, across) * (1 - 2 * side)
@@ -151,7 +152,7 @@ def _thumb_of(skeleton: Skeleton, chains: list[tuple[int, ...]], wrist: Array) -
 
 def _turns(skeleton: Skeleton, hand: _Hand, pose: HandPose) -> dict[int, Array]:
     """(4,) rotations of the fingers' joints in their parents' frames."""
-    found: dict[int, Array] = {}
+    turns: dict[int, Array] = {}
     first, last = (np.radians(bend) for bend in _BENDS[pose])
     for number, chain in enumerate(hand.fingers):
         share = number / max(len(hand.fingers) - 1, 1)
@@ -159,13 +160,13 @@ def _turns(skeleton: Skeleton, hand: _Hand, pose: HandPose) -> dict[int, Array]:
         flat = _unit(own - float(own @ hand.palm) * hand.palm)
         straight = _unit(flat + _GATHERED[pose] * (hand.along - flat))
         bends = _shared(first * (1 - share) + last * share, len(chain))
-        found |= _bent(skeleton, chain, straight, hand.palm, bends)
+        turns |= _bent(skeleton, chain, straight, hand.palm, bends)
     if hand.thumb:
         own = _bones(skeleton, hand.thumb)[0]
         inwards = 0.6 * hand.palm - 0.8 * hand.across
         bends = _shared(np.radians(_THUMB[pose]), len(hand.thumb))
-        found |= _bent(skeleton, hand.thumb, own, inwards, bends)
-    return found
+        turns |= _bent(skeleton, hand.thumb, own, inwards, bends)
+    return turns
 
 
 def _bent(
@@ -173,14 +174,14 @@ def _bent(
 ) -> dict[int, Array]:
     """A finger laid along ``straight`` (3,), each joint bent by so many radians ``towards`` (3,)."""
     hinge = _unit(np.cross(straight, towards))
-    found: dict[int, Array] = {}
+    turns: dict[int, Array] = {}
     above, angle = rot.IDENTITY, 0.0
     for joint, bone, bend in zip(chain, _bones(skeleton, chain), bends, strict=True):
         angle += float(bend)
         turn = rot.multiply(rot.rotvec_to_quat(hinge * angle), rot.shortest_arc(bone, straight))
-        found[joint] = rot.normalize(rot.multiply(rot.inverse(above), turn))
+        turns[joint] = rot.normalize(rot.multiply(rot.inverse(above), turn))
         above = turn
-    return found
+    return turns
 
 
 def _bones(skeleton: Skeleton, chain: tuple[int, ...]) -> list[Array]:

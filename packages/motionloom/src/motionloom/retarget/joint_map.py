@@ -70,13 +70,11 @@ def joint_map(skeleton: Skeleton, override: Override | None = None) -> JointMap:
     """
     stated = skeleton.humanoid.items()
     named = {part: {joint: 1.0} for part, joint in stated if joint in skeleton.names}
-    given = named | _read_override(skeleton, override)
-    if set(given) >= set(SMPL22.names):
-        found: dict[str, dict[str, float]] = {}
-    else:
-        found = _family(skeleton) or _humanoid(skeleton, given)
-    points = found | given
-    if given:
+    overrides = named | _read_override(skeleton, override)
+    points = overrides
+    if not overrides.keys() >= set(SMPL22.names):
+        points = (_family(skeleton) or _humanoid(skeleton, overrides)) | overrides
+    if overrides:
         _check_apart(points)
     return JointMap(tuple(tuple(points[name].items()) for name in SMPL22.names))
 
@@ -125,22 +123,21 @@ _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 _NEEDED = tuple(f"{side}_{part}" for part in _LIMBS for side in ("left", "right"))
 
 
-def _humanoid(skeleton: Skeleton, given: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
+def _humanoid(skeleton: Skeleton, overrides: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
     """The 22 points by names, else by the shape of the tree."""
-    hints: Parts = {part: skeleton.index(next(iter(point))) for part, point in given.items() if len(point) == 1}
+    hints: Parts = {part: skeleton.index(next(iter(point))) for part, point in overrides.items() if len(point) == 1}
     named = parts_by_name(skeleton) | hints
-    parts = named if not _missing(skeleton, named) else (parts_by_shape(skeleton) or {}) | hints
-    missing = _missing(skeleton, parts)
-    if missing:
-        missing = _missing(skeleton, named) or missing
+    missing = _missing(skeleton, named)
+    parts = (parts_by_shape(skeleton) or {}) | hints if missing else named
+    if missing and _missing(skeleton, parts):
         raise MotionloomError(
             f"the skeleton is not a humanoid that can be read: no joint was found for {', '.join(missing)} among "
-            f"{_shown(skeleton)}; name the missing ones in a joint map (SMPL joint: joint of the file)"
+            f"{_joint_list(skeleton)}; name the missing ones in a joint map (SMPL joint: joint of the file)"
         )
     return _points(skeleton, parts)
 
 
-def _shown(skeleton: Skeleton) -> str:
+def _joint_list(skeleton: Skeleton) -> str:
     names = [n for j, n in enumerate(skeleton.names) if j not in skeleton.ends]
     return ", ".join(names[:30]) + (f" and {len(names) - 30} more" if len(names) > 30 else "")
 
@@ -210,11 +207,11 @@ def _spine_top(skeleton: Skeleton, chest: int) -> int:
     return top
 
 
-def _palm(skeleton: Skeleton, parts: Parts, part: str) -> list[int]:
+def _palm(skeleton: Skeleton, parts: Parts, part: str) -> tuple[int, ...]:
     """What hangs on the forearm where no joint is the hand."""
     side, _, kind = part.partition("_")
     elbow = parts.get(f"{side}_elbow")
-    return list(skeleton.children(elbow)) if kind == "wrist" and elbow is not None else []
+    return skeleton.children(elbow) if kind == "wrist" and elbow is not None else ()
 
 
 def _spine_points(skeleton: Skeleton, pelvis: int, spine: list[int], neck: int) -> dict[str, dict[str, float]]:
@@ -270,15 +267,15 @@ def _read_override(skeleton: Skeleton, override: Override | None) -> dict[str, d
 
 def _check_apart(points: Mapping[str, Mapping[str, float]]) -> None:
     """Refuse one joint for two parts that have a bone between them."""
-    taken: dict[str, str] = {}
+    parts: dict[str, str] = {}
     for part in ("pelvis", *_NEEDED, "head"):
         if len(points[part]) == 1:
             name = next(iter(points[part]))
-            if name in taken:
+            if name in parts:
                 raise MotionloomError(
-                    f"the joint map gives both {taken[name]} and {part} as {name!r}; name another joint for one of them"
+                    f"the joint map gives both {parts[name]} and {part} as {name!r}; name another joint for one of them"
                 )
-            taken[name] = part
+            parts[name] = part
 
 
 def _check_point(skeleton: Skeleton, part: str, value: object) -> dict[str, float]:
@@ -289,7 +286,7 @@ def _check_point(skeleton: Skeleton, part: str, value: object) -> dict[str, floa
         raise MotionloomError(f"the joint map gives {part} as {value!r}; a name or weights of names are needed")
     for name, weight in point.items():
         if name not in skeleton.names:
-            raise MotionloomError(f"the joint map gives {part} as {name!r}; the joints are {_shown(skeleton)}")
+            raise MotionloomError(f"the joint map gives {part} as {name!r}; the joints are {_joint_list(skeleton)}")
         if isinstance(weight, bool) or not isinstance(weight, int | float) or not abs(weight) <= 1e9:
             raise MotionloomError(
                 f"the joint map gives {part} the weight {str(weight)[:40]}; numbers adding up to 1 are needed"

@@ -43,15 +43,22 @@ def placed(skeleton: Skeleton, world: Array) -> Array:
     return places
 
 
-def aim(world: Array, body: Body, joint: int, now: Array, wanted: Array) -> Array:
-    """World rotations (frames, joints, 4) with one SMPL joint's bone turned from ``now`` to ``wanted`` (frames, 3).
+def local_rotations(skeleton: Skeleton, world: Array) -> Array:
+    """World orientations (frames, joints, 4) to each joint's in its parent's frame, without sign flips in time."""
+    local, parents = world.copy(), list(skeleton.parents[1:])
+    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
+    return rot.unroll(rot.normalize(local))
+
+
+def aim(world: Array, body: Body, joint: int, now: Array, direction: Array) -> Array:
+    """World rotations (frames, joints, 4) with one SMPL joint's bone turned from ``now`` to ``direction`` (frames, 3).
 
     The turn has no twist; what follows the bone rigidly turns along.
     """
     driver = body.drivers[joint]
     assert driver is not None
     turned = world.copy()
-    turn = rot.shortest_arc(now, wanted)
+    turn = rot.shortest_arc(now, direction)
     stop = {d for j, d in enumerate(body.drivers) if d is not None and d != driver}
     follows = {driver}
     for k in range(driver + 1, len(body.skeleton)):
@@ -74,7 +81,7 @@ def bend_limb(world: Array, body: Body, limb: Limb, places: Array, goal: Array, 
     return aim(world, body, middle, third - second, reached - bent)
 
 
-def shoulders_moved(positions: Array, world: Array, body: Body) -> Array:
+def read_shrug(positions: Array, world: Array, body: Body) -> Array:
     """(frames, 2, 3) how far the shoulders are from their rest on the chest, in its frame and in lengths of the arm.
 
     ``positions`` (frames, joints, 3) metres and ``world`` (frames, joints, 4) are of the body's joints. Zero
@@ -112,14 +119,14 @@ def shrug(world: Array, chest: Array, moved: Array, body: Body) -> Array:
 def reach(world: Array, moved: Array, body: Body) -> Array:
     """World rotations (frames, joints, 4) with arms bent so that hands are where other shoulders would put them.
 
-    ``moved`` (frames, 2, 3) says where these are, as `shoulders_moved` of another body does. A hand out of reach goes
+    ``moved`` (frames, 2, 3) says where these are, as `read_shrug` of another body does. A hand out of reach goes
     as far as it can.
     """
     chest = body.drivers[CHEST]
     if chest is None:
         return world
     positions = placed(body.skeleton, world)
-    lost = (moved - shoulders_moved(positions, world, body)) * body.arm
+    lost = (moved - read_shrug(positions, world, body)) * body.arm
     lost = rot.rotate(rot.multiply(world[:, chest], body.frames[CHEST])[:, None], lost)
     places = body.places(positions, world)
     for side, arm in enumerate(ARM_JOINTS):

@@ -29,16 +29,17 @@ _SIDED = {
     "wrist": "wrist hand",
 }
 _MIDDLE = {"pelvis": "pelvis hips hip lowertorso", "neck": "neck lowerneck neckbase", "head": "head"}
-_WORDS = {word for words in (*_SIDED.values(), *_MIDDLE.values()) for word in words.split()}
+_WORDS = set(" ".join((*_SIDED.values(), *_MIDDLE.values())).split())
 
 
-def _tokens(name: str) -> list[str]:
-    bare = re.split(r"[:|]", name)[-1]
-    return [t.lower() for t in _TOKEN.findall(bare)]
+def tokens_of(name: str) -> list[str]:
+    """The words and numbers of a name in small letters: ``LeftUpLeg1`` has left, up, leg and 1."""
+    return [token.lower() for token in _TOKEN.findall(name)]
 
 
-def _side(tokens: list[str]) -> tuple[str, list[str]]:
+def _side(name: str) -> tuple[str, list[str]]:
     """``left``, ``right`` or ``middle`` and the tokens that remain."""
+    tokens = tokens_of(re.split(r"[:|]", name)[-1])
     for side, marks in _MARKS.items():
         if any(t in marks.split() for t in tokens):
             return side, [t for t in tokens if t not in marks.split()]
@@ -56,7 +57,7 @@ def _plain(tokens: list[str]) -> str:
 
 def read_name(name: str) -> tuple[str, str]:
     """Side and word of one joint name: ``mixamorig:LeftUpLeg`` -> ``("left", "upleg")``; helpers give ``""``."""
-    side, tokens = _side(_tokens(name))
+    side, tokens = _side(name)
     if not set(tokens).isdisjoint(_HELPERS.split()):
         return side, ""
     numbers = [t for t in tokens if t.isdigit() and t not in ("0", "00", "1", "01")]
@@ -65,23 +66,23 @@ def read_name(name: str) -> tuple[str, str]:
 
 def read_word(name: str) -> str:
     """The word of a joint's name without side and number: ``DEF-spine.003`` -> ``spine``."""
-    _, tokens = _side(_tokens(name))
+    _, tokens = _side(name)
     return _plain(tokens)
 
 
 def parts_by_name(skeleton: Skeleton) -> Parts:
     """The parts whose joints the names give, sided ones as ``left_knee``; what is not named is left out."""
-    found: dict[tuple[str, str], int] = {}
+    joints: dict[tuple[str, str], int] = {}
     for j in range(len(skeleton)):
         if j not in skeleton.ends:
-            found.setdefault(read_name(skeleton.names[j]), j)  # parents come first: the upper of two wins
+            joints.setdefault(read_name(skeleton.names[j]), j)  # parents come first: the upper of two wins
     parts: Parts = {}
     for part, words in _MIDDLE.items():
-        joint = next((found["middle", w] for w in words.split() if ("middle", w) in found), None)
+        joint = next((joints["middle", w] for w in words.split() if ("middle", w) in joints), None)
         if joint is not None:
             parts[part] = joint
     for side in ("left", "right"):
-        parts.update(_sided(skeleton, side, found))
+        parts.update(_sided(skeleton, side, joints))
     return _apart(skeleton, parts)
 
 
@@ -99,17 +100,17 @@ def _apart(skeleton: Skeleton, parts: Parts) -> Parts:
     return parts
 
 
-def _sided(skeleton: Skeleton, side: str, found: dict[tuple[str, str], int]) -> Parts:
-    here = {word: j for (s, word), j in found.items() if s == side}
+def _sided(skeleton: Skeleton, side: str, joints: dict[tuple[str, str], int]) -> Parts:
+    here = {word: j for (s, word), j in joints.items() if s == side}
     limb = {part: next((here[w] for w in words.split() if w in here), None) for part, words in _SIDED.items()}
     if limb["foot"] is not None and limb["foot"] == limb["ankle"]:
-        limb["foot"] = None  # "foot" is the toe joint only where an "ankle" stands above it
+        limb["foot"] = None  # "foot" is the toe joint only where an "ankle" is above it
     if limb["collar"] is not None and limb["collar"] == limb["shoulder"]:
         limb["collar"] = None  # "shoulder" is the collar bone only where an upper arm hangs on it
     wrist, hand = here.get("wrist"), here.get("hand")
     carries = hand is not None and not skeleton.ends.issuperset(skeleton.children(hand))
     if wrist is not None and hand is not None and skeleton.parents[hand] == wrist and carries:
-        limb["wrist"] = hand  # a wrist that only ends the forearm: the hand is what turns
+        limb["wrist"] = hand  # a wrist that only ends the forearm: the hand turns
     if limb["hip"] is None and "leg" in here and "knee" in here:
         limb["hip"], limb["knee"] = here["leg"], here["knee"]
     return {f"{side}_{part}": j for part, j in limb.items() if j is not None}

@@ -35,53 +35,53 @@ def onto(person: Motion, old: Motion, *, known: int | None = None) -> Motion:
     Raises:
         MotionloomError: where the old motion does not stand upright along +Y.
     """
-    made = match_root(old, retarget(person, old.skeleton))
-    back = made.frames(0, known) if known else match_root(old, retarget(to_smpl22(old), old.skeleton))
-    seen, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
-    apart = rot.multiply(seen.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
+    motion = match_root(old, retarget(person, old.skeleton))
+    back = motion.frames(0, known) if known else match_root(old, retarget(to_smpl22(old), old.skeleton))
+    original, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
+    apart = rot.multiply(original.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
     if np.median(np.abs(apart[:, 0])) < np.cos(np.radians(30)):
         raise MotionloomError("the clip does not stand upright along +Y; say which axis of its file is up (--up z)")
-    apart = (place_of(seen) - place_of(back)).mean(axis=0)
+    apart = (place_of(original) - place_of(back)).mean(axis=0)
     if known:
-        lowest, own = (joints22(motion)[:, [*FEET, *TOES], 1].min(axis=1) for motion in (back, seen))
+        lowest, own = (joints22(part)[:, [*FEET, *TOES], 1].min(axis=1) for part in (back, original))
         apart[1] = (own - lowest).mean()  # legs of another build stand as high, their hips need not
-        made = _held_alike(made, old, known)
-    return with_place(made, place_of(made) + apart)
+        motion = _held_alike(motion, old, known)
+    return with_place(motion, place_of(motion) + apart)
 
 
-def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
-    """``made`` with hands, head and toes held as they usually are in the first ``known`` frames of ``old``.
+def _held_alike(motion: Motion, old: Motion, known: int) -> Motion:
+    """``motion`` with hands, head and toes held as they usually are in the first ``known`` frames of ``old``.
 
     Places do not say how; without it they would turn to how the uniform person holds them, in a blink.
     """
-    drivers, rotations = read_body(made.skeleton).drivers, made.rotations.copy()
-    now = made.frames(0, known).world_rotations()
+    drivers, rotations = read_body(motion.skeleton).drivers, motion.rotations.copy()
+    now = motion.frames(0, known).world_rotations()
     was = old.frames(0, known).world_rotations()
     for joint in (drivers[leaf] for leaf in LEAVES):
         if joint is not None and drivers.count(joint) == 1:
             apart = mean_rotation(rot.multiply(rot.inverse(now[:, joint]), was[:, joint]), np.ones(known))
             rotations[:, joint] = rot.multiply(rotations[:, joint], apart)
-    return replace(made, rotations=rotations)
+    return replace(motion, rotations=rotations)
 
 
-def match_root(old: Motion, made: Motion) -> Motion:
+def match_root(old: Motion, motion: Motion) -> Motion:
     """The same poses as the old motion's files hold them, of as many frames: which joint carries the path.
 
     Files may hold the root still and move the hips in it; then the bones' changing lengths stay the old ones.
     """
     if old.translations is None:
-        return made
+        return motion
     carrier = _carrier(old.skeleton)
     if carrier == 0:
-        return replace(made, translations=old.translations)
+        return replace(motion, translations=old.translations)
     parent = old.skeleton.parents[carrier]
     above, place = old.world_rotations()[:, parent], old.positions()[:, parent]
-    rotations, translations = made.rotations.copy(), old.translations.copy()
+    rotations, translations = motion.rotations.copy(), old.translations.copy()
     chain = old.skeleton.ancestors(parent)
     rotations[:, chain] = old.rotations[:, chain]
     undo = rot.inverse(above)
-    rotations[:, carrier] = rot.multiply(undo, made.world_rotations()[:, carrier])
-    translations[:, carrier] = rot.rotate(undo, made.positions()[:, carrier] - place)
+    rotations[:, carrier] = rot.multiply(undo, motion.world_rotations()[:, carrier])
+    translations[:, carrier] = rot.rotate(undo, motion.positions()[:, carrier] - place)
     return Motion(old.skeleton, old.fps, old.root, rotations, translations)
 
 

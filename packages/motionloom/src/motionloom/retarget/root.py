@@ -39,7 +39,7 @@ def place_root(motion: Motion, body: Body, mode: RootMode) -> Motion:
     hips = places[:, pelvis] - way if mode == "in-place" else places[:, pelvis]
     if root is None:
         return replace(motion, root=motion.root - way) if mode == "in-place" else motion
-    ground = float(body.rest[10:12, 1].mean()) - body.toe_height  # where the soles are at rest
+    ground = float(body.rest[10:12, 1].mean()) - body.toe_height  # of the soles at rest
     carried = way if mode == "motion" else np.zeros_like(way)
     line = body.skeleton.ancestors(pelvis)[::-1]
     above = {j: np.tile(rest[j] - [0.0, ground, 0.0], (len(motion), 1)) for j in line[:-1]}

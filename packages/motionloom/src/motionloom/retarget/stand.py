@@ -28,24 +28,24 @@ def stand(body: Body) -> GroundPose:
     """Where a body stands at rest and faces; `HERE` where its rest pose is nobody who stands."""
     if not body.upright or body.up[1] < 0.9:
         return HERE
-    found = ground_pose(body.rest)
-    near = np.hypot(found.x, found.z) < _NEAR * body.leg
-    facing = _along(found.facing, _ALIKE)
-    return GroundPose(0.0 if near else found.x, 0.0 if near else found.z, facing)
+    pose = ground_pose(body.rest)
+    near = np.hypot(pose.x, pose.z) < _NEAR * body.leg
+    facing = _along(pose.facing, _ALIKE)
+    return GroundPose(0.0 if near else pose.x, 0.0 if near else pose.z, facing)
 
 
 def _along(facing: float, near: float) -> float:
     """The axis that a direction is ``near`` to, else the direction; above -pi, at most pi."""
     quarter = round(facing / (np.pi / 2)) * np.pi / 2
-    found = quarter if abs(facing - quarter) < near else facing
-    return float(np.pi - (np.pi - found) % (2 * np.pi))
+    facing = quarter if abs(facing - quarter) < near else facing
+    return float(np.pi - (np.pi - facing) % (2 * np.pi))
 
 
 def begin(motion: Motion, body: Body) -> GroundPose:
     """Where the person of a motion on the body's skeleton is in the first frame, and faces."""
     first = motion.frames(0, 1)
-    found = ground_pose(body.places(first.positions(), first.world_rotations())[0])
-    return replace(found, facing=_along(found.facing, _SWAY))
+    pose = ground_pose(body.places(first.positions(), first.world_rotations())[0])
+    return replace(pose, facing=_along(pose.facing, _SWAY))
 
 
 def started(motion: Motion, body: Body, place: GroundPose) -> Motion:
@@ -53,11 +53,11 @@ def started(motion: Motion, body: Body, place: GroundPose) -> Motion:
     return moved(motion, body, world_of(begin(motion, body), place))
 
 
-def world_of(first: GroundPose, wanted: GroundPose) -> GroundPose:
-    """Where the world is in which somebody at ``first`` is at ``wanted``."""
+def world_of(first: GroundPose, goal: GroundPose) -> GroundPose:
+    """Where the world is in which somebody at ``first`` is at ``goal``."""
     back = first.inverse()
-    x, _, z = wanted.to_world(np.array([back.x, 0.0, back.z]))
-    return GroundPose(float(x), float(z), wanted.facing + back.facing)
+    x, _, z = goal.to_world(np.array([back.x, 0.0, back.z]))
+    return GroundPose(float(x), float(z), goal.facing + back.facing)
 
 
 def moved(motion: Motion, body: Body, world: GroundPose) -> Motion:

@@ -11,7 +11,7 @@ from motionloom.retarget.anatomy import FEET, TOES, Body
 
 Array = NDArray[np.float64]
 _ROUNDS = 3
-"""Tips of several toes do not lie in one plane with the turn, so that it is made in steps."""
+"""Tips of several toes do not lie in one plane with the turn, which therefore takes several steps."""
 
 
 def bend_toes(motion: Motion, body: Body) -> Motion:
@@ -38,9 +38,9 @@ def _bent(motion: Motion, toe: int, tips: list[int], *, left: Array) -> Motion:
     bones = places[:, tips] - places[:, [toe]]
     lengths = np.maximum(np.linalg.norm(bones, axis=-1), 1e-9)
     lowest = np.minimum(-places[:, toe, 1], 0.0)[:, None]
-    wanted = np.arcsin(np.clip(lowest / lengths, -1.0, 1.0))
+    least = np.arcsin(np.clip(lowest / lengths, -1.0, 1.0))
     slopes = np.arcsin(np.clip(bones[..., 1] / lengths, -1.0, 1.0))
-    lack = np.where(lengths > 1e-6, wanted - slopes, 0.0)
+    lack = np.where(lengths > 1e-6, least - slopes, 0.0)
     angle = np.maximum(lack.max(axis=1), 0.0)
     if not angle.any():
         return motion

@@ -19,7 +19,7 @@ from motionloom.retarget.anatomy import Body, read_body
 from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, LEG_JOINTS, SPINE, TOES, beside, trunk, unit
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
-from motionloom.retarget.limbs import aim, bend_limb, placed, reach, shoulders_moved, shrug
+from motionloom.retarget.limbs import aim, bend_limb, local_rotations, placed, reach, read_shrug, shrug
 from motionloom.retarget.root import RootMode, place_root
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
@@ -37,8 +37,8 @@ def joints22(motion: Motion, override: Override | None = None) -> Array:
 
     Raises `MotionloomError` naming the joints that could not be found; see `joint_map`.
     """
-    points = joint_map(motion.skeleton, override)
-    places = np.einsum("sj,fjc->fsc", points.matrix(motion.skeleton), motion.positions())
+    points = joint_map(motion.skeleton, override).matrix(motion.skeleton)
+    places = np.einsum("sj,fjc->fsc", points, motion.positions())
     if (places[:, FEET] == places[:, TOES]).all(axis=(0, 2)).any():
         return read_body(motion.skeleton, override).places(motion.positions(), motion.world_rotations())
     return places
@@ -81,27 +81,28 @@ def retarget(
         source = _read_source(motion, source_map)
     if not _LEGS[0] < body.leg < _LEGS[1]:
         size = _LEG / body.leg
-        made = retarget(motion, target.scaled(size), source_map=source_map, target_map=target_map, root=root)
-        return replace(made.scaled(1 / size), skeleton=target)
+        result = retarget(motion, target.scaled(size), source_map=source_map, target_map=target_map, root=root)
+        return replace(result.scaled(1 / size), skeleton=target)
     shrugs = not any(b.drivers[j] is None for b in (source, body) for j in COLLARS)
     pose = _read_pose(_y_up(motion, source), source, shrugs=shrugs)
     stance = read_stance(pose.places, motion.fps)
     characters = [b for b in (source, body) if b.on_floor and b.skeleton != SMPL22]
     if source.on_floor and characters:  # a recording's skeleton knows no floor
         stance = stance.on_floor(source.toe_height, slack=0.08 * source.leg)
-    goals = _scale(pose, stance, ratio=body.leg / source.leg, toe_height=body.toe_height)
+    ratio = body.leg / source.leg
+    goals = _scale(pose, stance, ratio=ratio, toe_height=body.toe_height)
     if source.broad or body.broad:
         out = body.broad - source.broad * body.leg / source.leg
         left = _smooth(rot.rotate(pose.frames[:, 0], np.eye(3)[1]), max(1, round(0.4 * motion.fps)))
-        goals = _spread(goals, out * left)  # so smooth in time that planted feet hardly slide
+        goals = _spread(goals, out * left)  # so smooth that planted feet hardly slide
     world = _orient(pose, body)
     if not shrugs:
         world = reach(world, pose.shoulders, body)
     elif source.known and body.known:
         moved = pose.shoulders * source.arm / source.breadth
         world = shrug(world, pose.frames[:, CHEST], moved, body)
-    made = _place(world, goals, body, motion.fps)
-    return made if root is None else place_root(made, body, root)
+    result = _place(world, goals, body, motion.fps)
+    return result if root is None else place_root(result, body, root)
 
 
 def _read_source(motion: Motion, override: Override | None) -> Body:
@@ -122,7 +123,7 @@ class _Pose:
     hips: Array
     """(frames, 3) metres: the middle between the hip joints."""
     shoulders: Array
-    """(frames, 2, 3) how far they are from their rest on the chest (`shoulders_moved`)."""
+    """(frames, 2, 3) how far they are from their rest on the chest (`read_shrug`)."""
     trunk: Array
     """(frames, 3) from the middle of the hip joints to that of the shoulder joints; where one of the two bodies has no
     collar bones, to where the shoulders belong on the chest."""
@@ -145,7 +146,7 @@ def _read_pose(motion: Motion, source: Body, *, shrugs: bool) -> _Pose:
         if CHILD[j] is not None and not rests and j not in (0, *SPINE, *FEET):  # the places say where a bone points
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
-    moved = shoulders_moved(motion.positions(), world, source)
+    moved = read_shrug(motion.positions(), world, source)
     line = trunk(places)
     if not shrugs and (chest := source.drivers[CHEST]) is not None:
         turned = rot.multiply(world[:, chest], source.frames[CHEST])
@@ -184,8 +185,8 @@ def _borrowed(above: Array, joint: int) -> tuple[Array, Array]:
 
 def _turn(a: Array, b: Array) -> Array:
     """Smallest turn from a to b; none where b has no length."""
-    turn = rot.shortest_arc(a, b)
-    return np.where(np.linalg.norm(b, axis=-1, keepdims=True) > 1e-6, turn, rot.IDENTITY)
+    length = np.linalg.norm(b, axis=-1, keepdims=True)
+    return np.where(length > 1e-6, rot.shortest_arc(a, b), rot.IDENTITY)
 
 
 # 2. Scale ------------------------------------------------------------------------------------------------------------
@@ -196,7 +197,7 @@ class _Goals:
     """What the target's feet and hips aim at, all scaled, in metres in the target's world."""
 
     hips: Array
-    """(frames, 3) the middle between the hip joints, before the difference of the feet is made up for."""
+    """(frames, 3) the middle between the hip joints, before the difference of the feet is compensated."""
     ankles: Array
     """(frames, 2, 3) where the source's ankles are, likewise."""
     toes: Array
@@ -204,7 +205,7 @@ class _Goals:
     flat: NDArray[np.bool_]
     """(frames, 2) whether the foot stands flat."""
     low: Array
-    """(frames, 2, 1) 1 where the toe is near the ground and leads the foot, 0 where it is high and the ankle does."""
+    """(frames, 2, 1) 1 where the toe is near the ground and guides the foot, 0 where it is high and the ankle does."""
     forward: Array
     """(frames, 3) where the pelvis faces, level; shorter where it faces up or down."""
     poles: Array
@@ -243,7 +244,7 @@ def _smooth(values: Array, reach: int) -> Array:
     """(frames, n) with each frame the mean of those up to ``reach`` away, near ones more."""
     kernel = np.hanning(2 * reach + 3)[1:-1]
     padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    smooth = [np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T]
+    smooth = [np.convolve(one, kernel / kernel.sum(), "valid") for one in padded.T]
     return np.asarray(np.stack(smooth, axis=-1), dtype=np.float64)
 
 
@@ -282,20 +283,20 @@ def _orient(pose: _Pose, body: Body) -> Array:
     return _straighten(world, body, pose.trunk)
 
 
-def _straighten(world: Array, body: Body, wanted: Array) -> Array:
-    """World rotations (frames, joints, 4) with the spine turned so that the trunk points along ``wanted`` (frames, 3).
+def _straighten(world: Array, body: Body, along: Array) -> Array:
+    """World rotations (frames, joints, 4) with the spine turned so that the trunk points along ``along`` (frames, 3).
 
     The line from the hips to the shoulders says how a trunk leans; single joints of the spine lie elsewhere on every
     skeleton. Pelvis, collar bones, neck and limbs keep their orientations.
     """
     turning = {body.drivers[j]: j for j in reversed(SPINE) if body.drivers[j] not in (None, body.drivers[0])}
-    wanted = unit(wanted)
+    along = unit(along)
     for _ in range(_ROUNDS if turning else 0):
         now = unit(trunk(body.places(placed(body.skeleton, world), world)))
-        if float((now * wanted).sum(axis=-1).min()) > _ALIGNED:
+        if float((now * along).sum(axis=-1).min()) > _ALIGNED:
             break
         for joint in turning.values():
-            world = aim(world, body, joint, now, wanted)
+            world = aim(world, body, joint, now, along)
     return world
 
 
@@ -319,14 +320,14 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     ankles = ankles + (1.0 - goals.low) * (goals.ankles + shift[:, None] - ankles)
     if body.skeleton.soles:
         lack = _lack(ankles, goals, body, world=world, places=places - root[:, None])
-        ankles, raised = _on_soles(ankles, goals, lack, fps, deepest=_DEEPEST * body.leg)
+        ankles, raised = _on_soles(ankles, goals, lack, fps, leg=body.leg)
         lift = np.array([0.0, raised, 0.0])
         root, places = root + lift, places + lift
     drop = _drop(places, ankles, body)
     root, places = root - drop, places - drop[:, None]
     for side, leg in enumerate(LEG_JOINTS):
         world = bend_limb(world, body, leg, places, ankles[:, side], goals.poles[:, side])
-    return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
+    return Motion(body.skeleton, fps, root, local_rotations(body.skeleton, world))
 
 
 def move_feet(motion: Motion, shift: Array) -> Motion:
@@ -343,18 +344,19 @@ def move_feet(motion: Motion, shift: Array) -> Motion:
         lack = (0.01 - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
         pole = out + lack * (places[:, TOES[side]] - ankle)
         world = bend_limb(world, body, leg, places, ankle + shift[:, side], pole)
-    return replace(motion, rotations=_locals(motion.skeleton, world))
+    return replace(motion, rotations=local_rotations(motion.skeleton, world))
 
 
-def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float, *, deepest: float) -> tuple[Array, float]:
+def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float, *, leg: float) -> tuple[Array, float]:
     """The ankles' goals (frames, 2, 3), and by how many metres the whole body is raised, for feet of another shape.
 
     What both feet ``lack`` (`_lack`) while one of them stands flat, in the middle over the clip, raises everybody; what
-    is left raises a foot. What both lack while neither stands, or by more than the ``deepest`` metres that the shapes
-    of feet make, is left: it may as well be a pose in the air with pointed toes, which games play in one place.
+    is left raises a foot. What both lack while neither stands, or by more than `_DEEPEST` lengths of the ``leg``, as
+    much as the shapes of feet make, is left: it may as well be a pose in the air with pointed toes, which games play in
+    one place.
     """
     common = lack.min(axis=1)
-    flat = goals.flat.any(axis=1) & (common < deepest)
+    flat = goals.flat.any(axis=1) & (common < _DEEPEST * leg)
     whole = float(np.median(common[flat])) if flat.sum() >= 3 else 0.0
     reach = max(1, round(0.2 * fps))
     near = np.lib.stride_tricks.sliding_window_view(np.pad(flat, reach), 2 * reach + 1).max(axis=1)
@@ -380,9 +382,9 @@ def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Arr
         own = [j for j in body.skeleton.soles if driver in body.skeleton.ancestors(j)]
         for j in own:
             points = rot.rotate(world[:, None, j], body.skeleton.soles[j][None]) + joints[:, None, j]
-            under = (points - places[:, None, foot])[..., 1].min(axis=1)
+            low = (points - places[:, None, foot])[..., 1].min(axis=1)
             ground = floor + np.minimum(goals.toes[:, side, 1] - body.toe_height, 0.0)
-            lack[:, side] = np.maximum(lack[:, side], ground - under - ankles[:, side, 1])
+            lack[:, side] = np.maximum(lack[:, side], ground - low - ankles[:, side, 1])
     return lack
 
 
@@ -411,9 +413,3 @@ def _drop(places: Array, ankles: Array, body: Body) -> Array:
     need = np.clip(need, 0.0, 0.15)
     wide = np.lib.stride_tricks.sliding_window_view(np.pad(need, 3, mode="edge"), 7).max(axis=1)
     return _smooth(wide[:, None], 3) * np.array([0.0, 1.0, 0.0])
-
-
-def _locals(skeleton: Skeleton, world: Array) -> Array:
-    local, parents = world.copy(), list(skeleton.parents[1:])
-    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
-    return rot.unroll(rot.normalize(local))

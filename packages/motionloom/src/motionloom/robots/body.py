@@ -32,7 +32,7 @@ _KEYS = ("home", "stand", "standing", "default")
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A humanoid robot that motion can be put on."""
+    """A humanoid robot to which motion can be retargeted."""
 
     file: Model
     parts: Parts
@@ -137,11 +137,11 @@ class _Reading:
             ankle = places[f"{side}_ankle"]
             toe = ankle + 0.8 * (front - ankle)
             places[f"{side}_foot"] = np.array([toe[0], ankle[1], front[2]])
-        corners = {side: soles[side] - places[f"{side}_ankle"] for side in SIDES}
-        model, skeleton = self._with_sites(places, bodies), _skeleton(places, corners)
+        soles = {side: soles[side] - places[f"{side}_ankle"] for side in SIDES}
+        model, skeleton = self._with_sites(places, bodies), _skeleton(places, soles)
         notes = (*self.file.notes, *notes)
         home, rolls = self._home(), self._rolls()
-        return Robot(self.file, self.parts, model, skeleton, home, corners, rolls, notes)
+        return Robot(self.file, self.parts, model, skeleton, home, soles, rolls, notes)
 
     def _pose(self) -> None:
         mujoco = load_mujoco()
@@ -202,8 +202,8 @@ class _Reading:
     def _tip(self, body: int) -> Array:
         """(3,) in a body's frame: the farthest origin of the bodies fixed to it, else the farthest point of its own."""
         model, data = self.file.model, posed(self.file.model)
-        fixed = [data.xpos[b] for b in range(model.nbody) if model.body_weldid[b] == body]
-        points = np.array(fixed) if len(fixed) > 1 else limb_points(self.file, body)
+        fixed = data.xpos[model.body_weldid == body]
+        points = fixed if len(fixed) > 1 else limb_points(self.file, body)
         away = points - data.xpos[body]
         return rot.rotate(rot.inverse(np.array(data.xquat[body])), away[int(np.linalg.norm(away, axis=-1).argmax())])
 
@@ -282,18 +282,16 @@ class _Reading:
         return np.concatenate(points) if points else np.zeros((0, 3))
 
     def _rolls(self) -> dict[str, tuple[float, float]]:
-        found: dict[str, tuple[float, float]] = {}
+        rolls: dict[str, tuple[float, float]] = dict.fromkeys(SIDES, (-np.inf, np.inf))
         for side in SIDES:
-            found[side] = (-np.inf, np.inf)
             for hinge in self.parts.hinges[f"{side}_ankle"]:
                 ahead = float(self.data.xaxis[hinge.joint][0])
                 row = self.file.hinges.index(hinge)
                 if abs(ahead) > 0.7:
-                    ends = np.sign(ahead) * (
-                        np.array([self.file.lower[row], self.file.upper[row]]) - self.qpos[7 + row]
-                    )
-                    found[side] = (float(ends.min()), float(ends.max()))
-        return found
+                    limits = np.array([self.file.lower[row], self.file.upper[row]])
+                    ends = np.sign(ahead) * (limits - self.qpos[7 + row])
+                    rolls[side] = (float(ends.min()), float(ends.max()))
+        return rolls
 
     def _check_size(self, places: dict[str, Array]) -> None:
         leg = sum(

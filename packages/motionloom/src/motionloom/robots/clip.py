@@ -36,7 +36,7 @@ class Clip:
     errors: Array | None = None
     """(frames, 4) metres from where `EFFECTORS` were to be; None where nobody knows."""
     slowed: float = 0.0
-    """Seconds that it is longer than what it was made of, so that hinges keep their speeds."""
+    """Seconds that it is longer than its motion, so that hinges keep their speeds."""
 
     def __len__(self) -> int:
         return len(self.qpos)
@@ -68,7 +68,7 @@ def put_on_robot(
             of the model's file, where it states any.
         avoid_collisions: Keep the robot's geoms apart, where that is possible.
         source_map: Which joints of the motion's skeleton are which.
-        progress: Told (frames done, of how many).
+        progress: Called with the frames that are done, and with all.
 
     Raises:
         MotionloomError: The motion is not a person's, or a setting cannot be.
@@ -78,7 +78,8 @@ def put_on_robot(
     poses, reached = solve(robot, targets, avoid=avoid_collisions, watched=EFFECTORS, progress=progress)
     rows = [targets.joints.index(joint) for joint in EFFECTORS]
     errors = np.linalg.norm(reached - targets.places[:, rows], axis=-1)
-    return _paced(Clip(fps, poses, targets.planted, errors), robot.file.speeds(max_speed))
+    clip = Clip(fps, poses, targets.planted, errors)
+    return _paced(clip, robot.file.speeds(max_speed))
 
 
 def check_settings(fps: float, max_speed: float | None) -> None:
@@ -112,17 +113,18 @@ def sampled(clip: Clip, at: Array, fps: float | None = None) -> Clip:
     poses[:, 3:7] = rot.slerp(clip.qpos[low, 3:7], clip.qpos[high, 3:7], share[:, 0])
     nearest = np.where(share[:, 0] < 0.5, low, high)
     errors = None if clip.errors is None else clip.errors[nearest]
-    return Clip(clip.fps if fps is None else fps, poses, clip.planted[nearest], errors, clip.slowed)
+    fps = clip.fps if fps is None else fps
+    return Clip(fps, poses, clip.planted[nearest], errors, clip.slowed)
 
 
 def velocities(robot: Robot, clip: Clip) -> Array:
     """(frames, 6 + hinges) MuJoCo's ``qvel``: metres and radians per second, the root's turn in its own frame."""
     mujoco = load_mujoco()
 
-    found = np.zeros((len(clip), robot.model.nv))
+    qvel = np.zeros((len(clip), robot.model.nv))
     for frame in range(len(clip)):
         before, after = max(frame - 1, 0), min(frame + 1, len(clip) - 1)
         if after > before:
             span = (after - before) / clip.fps
-            mujoco.mj_differentiatePos(robot.model, found[frame], span, clip.qpos[before], clip.qpos[after])
-    return found
+            mujoco.mj_differentiatePos(robot.model, qvel[frame], span, clip.qpos[before], clip.qpos[after])
+    return qvel

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def load_mujoco() -> Any:
-    """The module `mujoco`, set to draw without a screen, or not at all: which way it takes is settled at its import.
+    """The module `mujoco`, set to draw without a screen, or not at all: which of them is decided at its import.
 
     Raises `ModuleNotFoundError` where it is not installed (the extra ``motionloom[robots]``).
     """

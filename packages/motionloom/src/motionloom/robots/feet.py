@@ -47,9 +47,9 @@ def plant(places: Array, turns: Array, planted: Flags, sole: Array, fps: float) 
         calm = flat if flat.any() else np.ones(stop - start, dtype=bool)
         heading = float(np.arctan2(np.sin(yaw[calm]).mean(), np.cos(yaw[calm]).mean()))
         pitch = np.where(on_toes | on_heel, pitch, 0.0) * _away(flat, max(1, round(_ROLL * fps)))
-        turned[some] = turned_by(heading, pitch)
+        turned[some] = orient(heading, pitch)
         pivot = np.where(pitch[:, None] < 0, heel, toes)
-        under = rot.rotate(turned_by(heading, np.zeros(1)), pivot)
+        under = rot.rotate(orient(heading, np.zeros(1)), pivot)
         own = places[some] + rot.rotate(turns[some], pivot) - under  # the ankle if the foot were flat on that pivot
         middle = own[calm].mean(axis=0)
         middle[2] = -float(sole[:, 2].min())
@@ -67,7 +67,8 @@ def heel_and_toes(corners: Array) -> Array:
 
 def lowest(places: Array, turns: Array, sole: Array) -> Array:
     """(frames,) metres: the height of the lowest corner of a sole."""
-    return (rot.rotate(turns[:, None], sole[None]) + places[:, None])[..., 2].min(axis=1)
+    corners = rot.rotate(turns[:, None], sole[None]) + places[:, None]
+    return corners[..., 2].min(axis=1)
 
 
 def _stances(places: Array, turns: Array, planted: Flags, hole: int) -> Iterator[tuple[int, int]]:
@@ -105,7 +106,7 @@ def angles(turns: Array) -> tuple[Array, Array]:
     return np.arctan2(ahead[..., 1], ahead[..., 0]), np.arcsin(np.clip(-ahead[..., 2], -1, 1))
 
 
-def turned_by(heading: float, pitch: Array) -> Array:
+def orient(heading: float, pitch: Array) -> Array:
     """(frames, 4) orientations of feet without roll."""
     about_z = rot.rotvec_to_quat(np.array([0.0, 0.0, heading]))
     return rot.multiply(about_z, rot.rotvec_to_quat(pitch[:, None] * np.array([0.0, 1.0, 0.0])))

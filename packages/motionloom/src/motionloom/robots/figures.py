@@ -70,36 +70,36 @@ class Figures:
 
     def faults(self) -> list[str]:
         """What is over the limits that `docs/robots.md` names, in words."""
-        found = []
+        over = []
         if self.limits_broken:
-            found.append(f"{self.limits_broken} angles are out of range")
+            over.append(f"{self.limits_broken} angles are out of range")
         if self.float_cm > 1.0:
-            found.append(f"planted soles float {self.float_cm:.1f} cm")
+            over.append(f"planted soles float {self.float_cm:.1f} cm")
         if self.slide_cm > 0.3:
-            found.append(f"planted soles slide {self.slide_cm:.2f} cm a frame")
+            over.append(f"planted soles slide {self.slide_cm:.2f} cm a frame")
         if self.sunk_cm > 1.0:
-            found.append(f"soles are {self.sunk_cm:.1f} cm in the ground")
+            over.append(f"soles are {self.sunk_cm:.1f} cm in the ground")
         if self.largest_step * self.fps > 15.001:
-            found.append(f"{self.fastest} jumps {self.largest_step:.2f} rad in a frame")
+            over.append(f"{self.fastest} jumps {self.largest_step:.2f} rad in a frame")
         if self.root_step_cm * self.fps > ROOT_JUMPS or self.root_turn * self.fps > 15.001:
-            found.append(f"the root jumps {self.root_step_cm:.1f} cm and {self.root_turn:.2f} rad in a frame")
+            over.append(f"the root jumps {self.root_step_cm:.1f} cm and {self.root_turn:.2f} rad in a frame")
         if self.speed_share is not None and self.speed_share > 1.001:
-            found.append(f"{self.fastest} is {self.speed_share:.2f} times as fast as it can be")
+            over.append(f"{self.fastest} is {self.speed_share:.2f} times as fast as it can be")
         if self.effector_cm is not None and self.effector_cm > 6.0:
-            found.append(f"hands and feet are {self.effector_cm:.1f} cm off")
+            over.append(f"hands and feet are {self.effector_cm:.1f} cm off")
         if self.collision_frames:
-            found.append(f"the robot touches itself in {self.collision_frames} frames")
-        return found
+            over.append(f"the robot touches itself in {self.collision_frames} frames")
+        return over
 
 
 def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figures:
     """The figures of a clip. max_speed: radians per second that no hinge is to exceed, beside what the model states."""
-    corners, masses, touching = _followed(clip, robot)
+    corners, masses, touching = _follow(clip, robot)
     planted = clip.planted
     edges = heel_and_toes(corners)
     stays = planted[1:] & planted[:-1]
     moved = np.linalg.norm(np.diff(edges[..., :2], axis=0), axis=-1)[stays]
-    stands = planted[..., 0] | planted[..., 1]
+    on_ground = planted[..., 0] | planted[..., 1]
     heights = corners[..., 2].min(axis=2)
     across = corners[:, :, 1] - corners[:, :, 0]
     slopes = across[..., 2] / np.linalg.norm(across, axis=-1)
@@ -112,17 +112,17 @@ def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figu
     share = top / most
     fastest = int((share if np.isfinite(most).any() else top).argmax())
     root_step, root_turn = _root_steps(clip.qpos[:, :7])
-    supported = stands[:, 0] | stands[:, 1]
-    outside = [_outside(masses[f], corners[f][stands[f]].reshape(-1, 3)) for f in np.flatnonzero(supported)]
+    supported = on_ground[:, 0] | on_ground[:, 1]
+    outside = [_outside(masses[f], corners[f][on_ground[f]].reshape(-1, 3)) for f in np.flatnonzero(supported)]
     return Figures(
         robot=robot.name,
         frames=len(clip),
         fps=clip.fps,
         slowed_seconds=round(clip.slowed, 3),
-        float_cm=_high(100 * heights[stands]),
+        float_cm=_high(100 * heights[on_ground]),
         slide_cm=_high(100 * moved),
         sunk_cm=round(100 * max(0.0, -float(heights.min())), 3),
-        sole_roll=_high(np.arcsin(slopes.clip(-1, 1))[stands]),
+        sole_roll=_high(np.arcsin(slopes.clip(-1, 1))[on_ground]),
         planted_share=round(float(supported.mean()), 3),
         limits_broken=int(((angles < lower - 1e-9) | (angles > upper + 1e-9)).sum()),
         at_limit_share=round(
@@ -151,7 +151,7 @@ def _high(values: Array) -> float:
     return round(float(np.percentile(np.abs(values), 95)), 3) if values.size else 0.0
 
 
-def _followed(clip: Clip, robot: Robot) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+def _follow(clip: Clip, robot: Robot) -> tuple[Array, Array, NDArray[np.bool_] | None]:
     """Corners of the soles (frames, 2, 4, 3), centres of mass (frames, 3), and frames in which the robot touches
     itself."""
     mujoco = load_mujoco()
@@ -189,11 +189,11 @@ def planted_soles(robot: Robot, qpos: Array, fps: float) -> NDArray[np.bool_]:
     motion = to_motion(robot, qpos, fps)
     places = to_mujoco(motion.positions())
     turns = turns_to_mujoco(motion.world_rotations())
-    found = np.zeros((len(qpos), 2, 2), dtype=bool)
+    planted = np.zeros((len(qpos), 2, 2), dtype=bool)
     for number, side in enumerate(SIDES):
         j = robot.skeleton.index(f"{side}_ankle")
         corners = places[:, j, None] + rot.rotate(turns[:, j, None], robot.soles[side][None])
         edges = heel_and_toes(corners)
         speed = np.linalg.norm(np.gradient(edges, axis=0), axis=-1) * fps if len(qpos) > 1 else np.zeros((1, 2))
-        found[:, number] = (edges[..., 2] < _LOW) & (speed < _SLOW)
-    return found
+        planted[:, number] = (edges[..., 2] < _LOW) & (speed < _SLOW)
+    return planted

@@ -40,10 +40,10 @@ def draw(robot: Robot, poses: Array, fps: float, path: Path, *, caption: str = "
         rate = film_rate(path, fps, None)
         count = max(1, round((len(poses) - 1) / fps * rate) + 1)
         places = np.minimum(np.arange(count) * fps / rate, len(poses) - 1)
-        shown = poses[places.round().astype(int)]
+        poses = poses[places.round().astype(int)]
 
         def frames(numbers: Sequence[int]) -> Iterator[Image.Image]:
-            return renderer.pictures(shown[list(numbers)])
+            return renderer.pictures(poses[list(numbers)])
 
         return write_film(frames, path, renderer.size, rate=rate, count=count)
 
@@ -69,8 +69,8 @@ class _Renderer:
         mujoco = load_mujoco()
 
         self.size = size
-        shown = read_robot(robot.file.path, meshes=True, override=robot.map)
-        self.model = _clothed(shown)
+        meshed = read_robot(robot.file.path, meshes=True, override=robot.map)
+        self.model = _clothed(meshed)
         self.data, self.camera = mujoco.MjData(self.model), mujoco.MjvCamera()
         self.camera.distance = 2.1 * _tall(robot)
         self.camera.azimuth = 130
@@ -109,10 +109,10 @@ def _clothed(robot: Robot) -> Any:
 
     spec, model, skeleton = robot.file.spec, robot.model, robot.skeleton
     visible = [g for g in range(model.ngeom) if model.geom_rgba[g][3] > 0]
-    seen = {int(model.body_weldid[model.geom_bodyid[g]]) for g in visible}
+    bodies = {int(model.body_weldid[model.geom_bodyid[g]]) for g in visible}
     own = {body.id: body for body in spec.bodies}
     thick = _THICK * float(np.linalg.norm(skeleton.offsets[skeleton.index("left_knee")]))
-    few = len(seen - {0}) < 0.6 * len({hinge.body for hinge in robot.file.hinges})
+    few = len(bodies - {0}) < 0.6 * len({hinge.body for hinge in robot.file.hinges})
     for j, parent in enumerate(skeleton.parents):
         if parent < 0 or not few:
             continue

@@ -12,7 +12,7 @@ from motionloom.blending import smoothstep
 from motionloom.motion import Motion
 from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
 from motionloom.robots.clip import check_settings
-from motionloom.robots.feet import EASE, ROLLING, angles, heel_and_toes, lowest, turned_by
+from motionloom.robots.feet import EASE, ROLLING, angles, heel_and_toes, lowest, orient
 from motionloom.robots.joints import SIDES
 from motionloom.robots.solve import Solver
 from motionloom.robots.targets import Targets, lack, lowered, rolled
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 _BEGINS, _ENDS = (0.03, 0.4), (0.05, 0.8)
 """Metres and metres per second: heel or toes that are lower and slower come to stand, and go on standing."""
 _STRAYS = (0.1, 0.5)
-"""Metres and radians that a planted foot is asked to be elsewhere, from which on it lets go."""
+"""Metres and radians from a planted foot to its goal, from which on it lets go."""
 _DOWN = 0.6
 """Metres per second at which the pelvis comes down, and goes up, so that legs reach."""
-_STANDS = 0.004
+_PLANTED = 0.004
 """Metres: a sole that is lower counts as planted."""
 
 
@@ -61,32 +61,32 @@ class Follower:
 
 
 class _Foot:
-    """Where one foot goes: what is asked of it, or its stance, and what is left of the way from one to the other."""
+    """Where one foot goes: its goal, or its stance, and what is left of the way from one to the other."""
 
     def __init__(self, sole: Array, fps: float) -> None:
         self.sole, self.fps = sole, fps
         self.edges = heel_and_toes(sole)
         self.before: Array | None = None
-        """(2, 3) where heel and toes were asked to be in the frame before."""
+        """(2, 3) where heel and toes were to be in the frame before."""
         self.stance: tuple[float, Array] | None = None
         """Heading, and the ankle's place, where the foot stands flat."""
         self.left, self.turn_left, self.since = np.zeros(3), np.zeros(3), 0
 
     def step(self, place: Array, turn: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Place (3,) and turn (4,) of the ankle in a frame, and which of heel and toes are planted."""
-        stands, asked = self._is_on_ground(place, turn), (place, turn)
-        if stands != (self.stance is not None):
-            now = self._faded(*self._sole_pose(*asked))
-            self.stance = self._stood(*now) if stands else None
-            to = self._sole_pose(*asked)
+        on_ground, goal = self._is_on_ground(place, turn), (place, turn)
+        if on_ground != (self.stance is not None):
+            now = self._faded(*self._sole_pose(*goal))
+            self.stance = self._stance_of(*now) if on_ground else None
+            to = self._sole_pose(*goal)
             self.left = now[0] - to[0]
             self.turn_left = rot.quat_to_rotvec(rot.multiply(rot.inverse(to[1]), now[1]))
             self.since = 0
-        place, turn = self._faded(*self._sole_pose(*asked))
+        place, turn = self._faded(*self._sole_pose(*goal))
         self.since += 1
         place = place + np.array([0.0, 0.0, max(0.0, -self._low(place, turn))])
         pitch = float(angles(turn[None])[1][0])
-        on = self.stance is not None and self._low(place, turn) < _STANDS
+        on = self.stance is not None and self._low(place, turn) < _PLANTED
         return place, turn, np.array([pitch <= 1e-3, pitch >= -1e-3]) & on
 
     def _low(self, place: Array, turn: Array) -> float:
@@ -108,27 +108,27 @@ class _Foot:
         return (place, turn) if self.stance is None else self._held(turn)
 
     def _held(self, turn: Array) -> tuple[Array, Array]:
-        """The ankle of a foot that stands and rolls over its heel or its toes as far as it is asked."""
+        """The ankle of a foot that stands and rolls over its heel or its toes as far as its goal does."""
         assert self.stance is not None
-        heading, stood = self.stance
+        heading, ankle = self.stance
         pitch = _rolled(turn)
         pivot = self.edges[0 if pitch < 0 else 1]
-        turned = turned_by(heading, np.array([pitch]))[0]
-        flat = turned_by(heading, np.zeros(1))[0]
-        return stood + rot.rotate(flat, pivot) - rot.rotate(turned, pivot), turned
+        turned = orient(heading, np.array([pitch]))[0]
+        flat = orient(heading, np.zeros(1))[0]
+        return ankle + rot.rotate(flat, pivot) - rot.rotate(turned, pivot), turned
 
-    def _stood(self, place: Array, turn: Array) -> tuple[float, Array]:
+    def _stance_of(self, place: Array, turn: Array) -> tuple[float, Array]:
         """The stance that leaves heel or toes of a foot over the place where they are."""
         heading = float(angles(turn[None])[0][0])
         pivot = self.edges[0 if _rolled(turn) < 0 else 1]
-        flat = turned_by(heading, np.zeros(1))[0]
-        stood = place + rot.rotate(turn, pivot) - rot.rotate(flat, pivot)
-        stood[2] = -float(self.sole[:, 2].min())
-        return heading, stood
+        flat = orient(heading, np.zeros(1))[0]
+        ankle = place + rot.rotate(turn, pivot) - rot.rotate(flat, pivot)
+        ankle[2] = -float(self.sole[:, 2].min())
+        return heading, ankle
 
     def _faded(self, place: Array, turn: Array) -> tuple[Array, Array]:
         """With what is left of the way from what it did before."""
-        left = 1.0 - float(smoothstep(np.array(min(1.0, self.since / (EASE * self.fps)))))
+        left = 1.0 - float(smoothstep(np.array(self.since / (EASE * self.fps))))
         return place + left * self.left, rot.multiply(turn, rot.rotvec_to_quat(left * self.turn_left))
 
 

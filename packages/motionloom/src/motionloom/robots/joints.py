@@ -4,7 +4,6 @@ A *part* is ``left_hip`` ... ``right_wrist``, ``waist`` or ``neck``, and has the
 Names are those of Unitree (G1, H1), Booster (T1), Fourier (N1), EngineAI (PM01), Atlas and their relatives.
 """
 
-import re
 from collections import defaultdict
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,16 +14,16 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.reading import read_json
+from motionloom.retarget.names import tokens_of
 from motionloom.robots.engine import posed
 from motionloom.robots.model import Hinge, Model
 
 Array = NDArray[np.float64]
 LEG, ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 SIDES = ("left", "right")
-PARTS = (*(f"{side}_{part}" for side in SIDES for part in (*LEG, *ARM)), "waist", "neck")
-_NEEDED = tuple(f"{side}_{part}" for side in SIDES for part in (*LEG, "shoulder", "elbow"))
+PARTS = (*(f"{s}_{p}" for s in SIDES for p in (*LEG, *ARM)), "waist", "neck")
+_NEEDED = tuple(f"{s}_{p}" for s in SIDES for p in (*LEG, "shoulder", "elbow"))
 
-_TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 _FINGERS = "thumb index middle ring pinky little finger gripper palm hand"
 _WORDS = {
     "hip": "hip thigh hpz hpx hpy",
@@ -63,44 +62,44 @@ def find_parts(model: Model, override: Path | None = None) -> Parts:
     override: a JSON file of part to the name of a hinge, or a list of names.
     Raises `MotionloomError` for what is no humanoid, naming the parts that were not found.
     """
-    given = {} if override is None else _read_map(model, override)
-    found, how = _by_name(model), "by their names"
-    if any(part not in found for part in _NEEDED if part not in given):
+    overrides = {} if override is None else _read_map(model, override)
+    parts, how = _by_name(model), "by their names"
+    if any(part not in parts for part in _NEEDED if part not in overrides):
         shaped = _by_shape(model)
         if shaped is not None:
-            found, how = shaped, "by the robot's shape"
-    found = {**found, **given}
-    lost = [part for part in _NEEDED if part not in found]
+            parts, how = shaped, "by the robot's shape"
+    parts = {**parts, **overrides}
+    lost = [part for part in _NEEDED if part not in parts]
     if lost:
         _refuse(model, lost)
     for side in SIDES:
         for limb in (LEG, ARM):
-            line = [found[f"{side}_{part}"] for part in limb if f"{side}_{part}" in found]
+            line = [parts[f"{side}_{part}"] for part in limb if f"{side}_{part}" in parts]
             for upper, lower in pairwise(line):
                 if upper[0].body not in model.above(lower[-1].body):
                     raise MotionloomError(
                         f"{model.path}: {lower[-1].name} does not hang below {upper[0].name} as a limb's joints do; "
                         "say which joint is which with --robot-map"
                     )
-    return Parts(found, "as the map says" if given else how)
+    return Parts(parts, "as the map says" if overrides else how)
 
 
 # By names
 
 
 def _by_name(model: Model) -> dict[str, tuple[Hinge, ...]]:
-    found: dict[str, list[Hinge]] = defaultdict(list)
+    parts: dict[str, list[Hinge]] = defaultdict(list)
     for hinge in model.hinges:
         names = (hinge.name, model.model.body(hinge.body).name)
         part = next((part for part in map(_read, names) if part is not None), None)
         if part is not None:
-            found[part].append(hinge)
-    return {part: tuple(hinges) for part, hinges in found.items()}
+            parts[part].append(hinge)
+    return {part: tuple(hinges) for part, hinges in parts.items()}
 
 
 def _read(name: str) -> str | None:
     """The part that a name speaks of: ``J00_HIP_PITCH_L`` -> ``left_hip``."""
-    tokens = [token.lower() for token in _TOKEN.findall(name)]
+    tokens = tokens_of(name)
     side = next((s for s in SIDES if s in tokens or s[0] in tokens), None)
     if not set(tokens).isdisjoint(_FINGERS.split()):
         return None
@@ -124,7 +123,7 @@ def _by_shape(model: Model) -> dict[str, tuple[Hinge, ...]] | None:
     arms = sorted(others, key=lambda key: -_length(chains[key], ends[key]))[:2]
     if len(legs) < 2 or len(arms) < 2:
         return None
-    found: dict[str, tuple[Hinge, ...]] = {}
+    parts: dict[str, tuple[Hinge, ...]] = {}
     shared = set(chains[legs[0]]) & set(chains[legs[1]]) | set(chains[arms[0]]) & set(chains[arms[1]])
     for limb, keys in ((LEG, legs), (ARM, arms)):
         by_side = sorted(keys, key=lambda key: -float(ends[key][1]))
@@ -134,13 +133,13 @@ def _by_shape(model: Model) -> dict[str, tuple[Hinge, ...]] | None:
                 return None
             middle = _middle(chain, ends[key])
             below = chain[middle + 1 :]
-            found[f"{side}_{limb[0]}"] = tuple(chain[:middle])
-            found[f"{side}_{limb[1]}"] = (chain[middle],)
+            parts[f"{side}_{limb[0]}"] = tuple(chain[:middle])
+            parts[f"{side}_{limb[1]}"] = (chain[middle],)
             if below:
-                found[f"{side}_{limb[2]}"] = tuple(below)
+                parts[f"{side}_{limb[2]}"] = tuple(below)
     if shared:
-        found["waist"] = tuple(hinge for hinge in model.hinges if hinge in shared)
-    return found
+        parts["waist"] = tuple(hinge for hinge in model.hinges if hinge in shared)
+    return parts
 
 
 def _chains(model: Model) -> dict[int, list[Hinge]]:
@@ -214,12 +213,12 @@ def _read_map(model: Model, path: Path) -> dict[str, tuple[Hinge, ...]]:
     data = read_json(path, "a map of a robot's joints")
     if not isinstance(data, dict):
         raise MotionloomError(f'{path}: a map of a robot\'s joints is an object such as {{"left_knee": "knee_l"}}')
-    of, found = {hinge.name: hinge for hinge in model.hinges}, {}
+    of, parts = {hinge.name: hinge for hinge in model.hinges}, {}
     for part, value in data.items():
         names = [value] if isinstance(value, str) else value
         if part not in PARTS:
             raise MotionloomError(f"{path} speaks of {part[:40]!r}; the parts are {', '.join(PARTS)}")
         if not isinstance(names, list) or not names or not all(isinstance(n, str) and n in of for n in names):
             raise MotionloomError(f"{path} gives {part} as {str(value)[:60]}; the hinges are {', '.join(of)[:300]}")
-        found[part] = tuple(sorted((of[name] for name in names), key=lambda hinge: hinge.joint))
-    return found
+        parts[part] = tuple(sorted((of[name] for name in names), key=lambda hinge: hinge.joint))
+    return parts

@@ -98,8 +98,8 @@ def read_model(path: Path | str, *, meshes: bool = False) -> Model:
     except MotionloomError:
         raise
     except (ValueError, RuntimeError) as error:
-        said = one_line(" ".join(str(error).split()))[:300]
-        raise MotionloomError(f"{path} is no model that MuJoCo reads: {said}") from None
+        line = one_line(" ".join(str(error).split()))[:300]
+        raise MotionloomError(f"{path} is no model that MuJoCo reads: {line}") from None
     hinges = _hinges(model, path)
     if not model.nu:
         notes.append(f"{path} has no actuators; that matters for --physics alone, where no force is limited then")
@@ -109,8 +109,8 @@ def read_model(path: Path | str, *, meshes: bool = False) -> Model:
     return Model(path, spec, model, hinges, lower, upper, _speeds(text, hinges), tuple(notes))
 
 
-def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
-    """Take meshes out that are not there and say so, and unless ``wanted`` those that are only looked at."""
+def _without_meshes(spec: Any, path: Path, meshes: bool) -> list[str]:
+    """Take meshes out that are not there and say so, and unless ``meshes`` those that are only looked at."""
     mujoco = load_mujoco()
 
     folder = path.parent / spec.meshdir
@@ -120,7 +120,7 @@ def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
     missing = {name: file for name, file in named if not (folder / file).is_file()}
     heavy = all(body.explicitinertial for body in spec.bodies if body.parent is not None)  # without its geoms
     for geom in list(spec.geoms):
-        looks = not wanted and heavy and not (geom.contype or geom.conaffinity)
+        looks = not meshes and heavy and not (geom.contype or geom.conaffinity)
         if geom.meshname and (geom.meshname in missing or looks):
             spec.delete(geom)
     used = {geom.meshname for geom in spec.geoms}
@@ -129,7 +129,7 @@ def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
             spec.delete(mesh)
     if missing:
         spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
-    for mesh in spec.meshes:  # one that MuJoCo thinks open is no reason to refuse a robot
+    for mesh in spec.meshes:  # no robot is refused for one that MuJoCo thinks open
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
     if not missing:
         return []
@@ -144,11 +144,11 @@ def _in_package(name: str, path: Path) -> str:
         return name
     package, _, inside = name.removeprefix("package://").partition("/")
     roots = path.resolve().parents
-    found = [above / inside for above in roots if above.name == package] + [
+    candidates = [above / inside for above in roots if above.name == package] + [
         roots[0] / inside,
         roots[0] / package / inside,
     ]
-    return next((str(one) for one in found if one.is_file()), name)
+    return next((str(one) for one in candidates if one.is_file()), name)
 
 
 def _free_root(spec: Any, path: Path) -> list[str]:
@@ -174,7 +174,7 @@ def _free_root(spec: Any, path: Path) -> list[str]:
 
 
 def _hinges(model: Any, path: Path) -> tuple[Hinge, ...]:
-    mujoco, data, found = load_mujoco(), posed(model), []
+    mujoco, data, hinges = load_mujoco(), posed(model), []
     for joint in range(model.njnt):
         kind, name = model.jnt_type[joint], model.joint(joint).name
         if kind == mujoco.mjtJoint.mjJNT_FREE:
@@ -186,20 +186,20 @@ def _hinges(model: Any, path: Path) -> tuple[Hinge, ...]:
             raise MotionloomError(f"{path} has {what}, {name!r}; a robot whose joints are all hinges is needed")
         body = int(model.jnt_bodyid[joint])
         parent, axis = int(model.body_parentid[body]), (data.xanchor[joint], data.xaxis[joint])
-        found.append(Hinge(name or f"joint{joint}", joint, body, parent, *axis))
-    if not found or len(found) > MAX_HINGES:
-        raise MotionloomError(f"{path} has {len(found)} hinges; a humanoid robot has some, and at most {MAX_HINGES}")
-    return tuple(found)
+        hinges.append(Hinge(name or f"joint{joint}", joint, body, parent, *axis))
+    if not hinges or len(hinges) > MAX_HINGES:
+        raise MotionloomError(f"{path} has {len(hinges)} hinges; a humanoid robot has some, and at most {MAX_HINGES}")
+    return tuple(hinges)
 
 
 def check_limits(model: Model, joints: set[int]) -> None:
     """Refuse a robot that has no limits at these joints (numbers in MuJoCo's model)."""
     own = [hinge for hinge in model.hinges if hinge.joint in joints]
-    open_ended = [hinge.name for hinge in own if not model.model.jnt_limited[hinge.joint]]
-    if open_ended:
-        more = f" and {len(open_ended) - 3} more" if len(open_ended) > 3 else ""
+    endless = [hinge.name for hinge in own if not model.model.jnt_limited[hinge.joint]]
+    if endless:
+        more = f" and {len(endless) - 3} more" if len(endless) > 3 else ""
         raise MotionloomError(
-            f"{model.path} states no limits for {', '.join(open_ended[:3])}{more}; give each joint a range in the model"
+            f"{model.path} states no limits for {', '.join(endless[:3])}{more}; give each joint a range in the model"
         )
 
 
@@ -213,5 +213,5 @@ def _speeds(text: bytes, hinges: tuple[Hinge, ...]) -> Array:
                 stated[joint.get("name", "")] = float(limit.get("velocity", ""))
     except (ElementTree.ParseError, ValueError):
         return np.full(len(hinges), np.inf)
-    found = np.array([stated.get(hinge.name, np.inf) for hinge in hinges])
-    return np.where(found > 0, found, np.inf)
+    speeds = np.array([stated.get(hinge.name, np.inf) for hinge in hinges])
+    return np.where(speeds > 0, speeds, np.inf)

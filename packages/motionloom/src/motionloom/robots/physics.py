@@ -33,7 +33,7 @@ class Tracking:
     held_error: float
     """The same with the root held to the clip, over all of it."""
     held_saturated: float
-    """Share of steps in which a motor wanted more than its force, root held."""
+    """Share of steps in which a motor needed more than its force, root held."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -56,14 +56,14 @@ def _run(clip: Clip, robot: Robot, *, held: bool) -> tuple[float, float, float]:
     mujoco = load_mujoco()
 
     model = _on_ground(robot)
-    if held:  # in the air: feet that push against the ground would tell of the holding alone
+    if held:  # in the air: feet that push the ground would show the holding alone
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data, speeds = mujoco.MjData(model), velocities(robot, clip)
     most = _forces(robot)
     data.qpos, data.qvel = clip.qpos[0], speeds[0]
     mujoco.mj_forward(model, data)
     stiff, damp = _gains(model, data, most)
-    model.dof_damping[6:] = damp  # in the model it is integrated implicitly, which is stable
+    model.dof_damping[6:] = damp  # integrated implicitly there, which is stable
     errors, saturated, steps = [], 0, round((len(clip) - 1) / clip.fps / STEP)
     pelvis = model.site(robot.site("pelvis")).id
     start = float(data.site_xpos[pelvis][2])
@@ -71,12 +71,12 @@ def _run(clip: Clip, robot: Robot, *, held: bool) -> tuple[float, float, float]:
         at = step * STEP * clip.fps
         low = min(int(at), len(clip) - 2)
         share = at - low
-        wanted = clip.qpos[low] * (1 - share) + clip.qpos[low + 1] * share
+        goal = clip.qpos[low] * (1 - share) + clip.qpos[low + 1] * share
         speed = speeds[low] * (1 - share) + speeds[low + 1] * share
         if held:
-            data.qpos[:7], data.qvel[:6] = wanted[:7], speed[:6]
+            data.qpos[:7], data.qvel[:6] = goal[:7], speed[:6]
             data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7])
-        force = stiff * (wanted[7:] - data.qpos[7:]) + damp * speed[6:]
+        force = stiff * (goal[7:] - data.qpos[7:]) + damp * speed[6:]
         # gravity and what turning costs are known to the motors, as on real robots
         force += data.qfrc_bias[6:] if held else 0.0
         saturated += bool((np.abs(force) > most).any())
@@ -84,7 +84,7 @@ def _run(clip: Clip, robot: Robot, *, held: bool) -> tuple[float, float, float]:
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qpos).all():
             return step * STEP, _rms(errors), saturated / max(step, 1)
-        errors.append(float(np.mean((wanted[7:] - data.qpos[7:]) ** 2)))
+        errors.append(float(np.mean((goal[7:] - data.qpos[7:]) ** 2)))
         tilt = np.arccos(np.clip(data.site_xmat[pelvis][8], -1, 1))  # between the pelvis' up and the world's
         if not held and (data.site_xpos[pelvis][2] < _FALLEN * start or tilt > 1.0):
             return step * STEP, _rms(errors), saturated / (step + 1)
@@ -116,7 +116,7 @@ def _gains(model: Any, data: Any, most: Array) -> tuple[Array, Array]:
 
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
-    inertia = 1 / np.diag(np.linalg.inv(mass))[6:]  # with everything else free to give way
+    inertia = 1 / np.diag(np.linalg.inv(mass))[6:]  # with all else free to move
     stiff = np.where(np.isfinite(most), most / SOFT, inertia * (2 * np.pi * FREQUENCY) ** 2)
     return stiff, 2 * np.sqrt(stiff * inertia)
 

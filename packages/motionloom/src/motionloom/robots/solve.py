@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 STEP = 15.0
 """Radians per second that no hinge exceeds from frame to frame: 0.3 rad at 50 frames per second."""
 _CATCHES_UP = np.array([2.0, 4.0])
-"""Metres and radians per second by which the root moves and turns faster at most than it is asked to: where a leg is
+"""Metres and radians per second by which the root moves and turns faster at most than its targets: where a leg is
 too slow for its foot, the foot is late and the body does not jump to it."""
 ROUNDS, AVOIDING_ROUNDS, FIRST_ROUNDS = 2, 4, 40
 """How often a frame's program is linearised anew; the first frame starts from the robot's own pose."""
@@ -68,11 +68,11 @@ class Solver:
         self.posture.set_target(robot.home)
         lower, upper = robot.file.lower + _MARGIN, robot.file.upper - _MARGIN
         step = np.minimum(STEP if speed is None else speed, STEP) / fps
-        self.limit = _box(robot, lower, upper, step, at_once=_SHORT if avoid else np.inf)
+        self.limit = _box(robot, lower, upper, step, most=_SHORT if avoid else np.inf)
         self.limits = [self.limit, _ground(robot), *([_apart(robot)] if avoid else [])]
         self.rounds = AVOIDING_ROUNDS if avoid else ROUNDS
         self.begun = False
-        self.asked = np.zeros(7)
+        self.goal = np.zeros(7)
         """Where the pelvis was to be, and how turned, in the frame before."""
 
     def frame(self, targets: Targets, number: int) -> Array:
@@ -89,10 +89,10 @@ class Solver:
         if not self.begun:
             self._place_root(targets, number)
         self.limit.before = self.configuration.q.copy() if self.begun else None
-        asked = np.concatenate([targets.place("pelvis")[number], targets.turn("pelvis")[number]])
-        steps = _between(self.asked, asked)
+        goal = np.concatenate([targets.place("pelvis")[number], targets.turn("pelvis")[number]])
+        steps = _between(self.goal, goal)
         self.limit.reach = np.abs(steps) + np.repeat(_CATCHES_UP, 3) / self.fps
-        self.asked = asked
+        self.goal = goal
         if self.begun:
             self.calm.set_target(self.configuration.q)
         for _ in range(self.rounds if self.begun else FIRST_ROUNDS):
@@ -105,10 +105,11 @@ class Solver:
         """One step; gives how far it went, in radians and metres."""
         import mink
 
-        tasks = [*self.tasks.values(), self.posture, *([self.calm] if self.begun else [])]
+        calm = [self.calm] if self.begun else []
+        tasks = [*self.tasks.values(), self.posture, *calm]
         try:
             velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits)
-        except mink.NoSolutionFound:  # parts that cannot be kept apart within the limits
+        except mink.NoSolutionFound:  # parts that cannot be kept apart within limits
             velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits[:2])
         pose = self.configuration.integrate(velocity, 1.0)
         pose[7:] = np.clip(pose[7:], *self.limit.bounds())
@@ -174,7 +175,7 @@ def _tasks(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, at_once: float) -> Any:
+def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, most: float) -> Any:
     """mink's limit of the hinges' places and of their and the root's steps since the frame before, in one."""
     import mink
 
@@ -197,7 +198,7 @@ def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, at_on
                 root, gone = self.reach, _between(self.before[:7], configuration.q[:7])
             room = np.concatenate([root - gone, high - now, root + gone, now - low]).clip(0)
             hinges = np.tile(np.arange(len(now) + 6) >= 6, 2)
-            room[hinges] = room[hinges].clip(0, at_once)
+            room[hinges] = room[hinges].clip(0, most)
             known = np.isfinite(room)
             return mink.Constraint(self.matrix[known], room[known])
 
@@ -245,12 +246,12 @@ def pairs_apart(robot: Robot) -> Iterator[tuple[int, int]]:
     nearest = np.zeros(6)
     for i, one in enumerate(own):
         for other in own[i + 1 :]:
-            bodies = [int(model.body_weldid[model.geom_bodyid[g]]) for g in (one, other)]
-            above = [int(model.body_weldid[model.body_parentid[b]]) for b in bodies]
+            welds = [int(model.body_weldid[model.geom_bodyid[g]]) for g in (one, other)]
+            above = [int(model.body_weldid[model.body_parentid[b]]) for b in welds]
             meet = model.geom_contype[one] & model.geom_conaffinity[other] | (
                 model.geom_contype[other] & model.geom_conaffinity[one]
             )
-            if not meet or bodies[0] == bodies[1] or bodies[0] in above[1:] or bodies[1] in above[:1]:
+            if not meet or welds[0] == welds[1] or welds[0] in above[1:] or welds[1] in above[:1]:
                 continue
             if mujoco.mj_geomDistance(model, data, one, other, 0.05, nearest) > 0.005:
                 yield one, other

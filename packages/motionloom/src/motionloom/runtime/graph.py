@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import TypeAlias
 
 LOCATION = "weights"
-"""What a graph says of where its initialisers lie: with the weights, in the same file."""
+"""Where a graph has its initialisers: with the weights, in the same file."""
 MAX_BYTES = 4 << 20
 MAX_NODES = 20_000
 MAX_CONSTANTS = 1 << 20
@@ -30,7 +30,7 @@ OPERATORS = frozenset(
 )
 _FLOAT, _INT32, _INT64 = 1, 6, 7
 _ENDS = (2**63 - 1, 1 - 2**63, -(2**63), 2**31 - 1, -(2**31))
-"""How slices say: to the end."""
+"""Ends of slices that run to the end."""
 
 Field: TypeAlias = "int | memoryview"
 
@@ -109,8 +109,8 @@ def _initialiser(tensor: memoryview) -> tuple[str, tuple[int, ...] | None, int]:
     if elsewhere or parts[13]:
         places = [dict(fields(_part(value))) for value in parts[13]]
         nothing = memoryview(b"")
-        said = [(_text(place.get(1, nothing)), _text(place.get(2, nothing))) for place in places]
-        if said != [("location", LOCATION)] or kind != _FLOAT or raw:
+        locations = [(_text(place.get(1, nothing)), _text(place.get(2, nothing))) for place in places]
+        if locations != [("location", LOCATION)] or kind != _FLOAT or raw:
             raise ValueError(f"a tensor {name!r} that lies in another file")
         return name, tuple(shape), 0
     if kind in (_INT32, _INT64):
@@ -130,8 +130,8 @@ def _unpacked(raw: bytes, kind: int) -> list[int]:
     return list(struct.unpack(f"<{count}{code}", raw[: count * size]))
 
 
-def _name(value_info: memoryview) -> str:
-    return next((_text(value) for number, value in fields(value_info) if number == 1), "")
+def _name(info: memoryview) -> str:
+    return next((_text(value) for number, value in fields(info) if number == 1), "")
 
 
 def _text(value: Field) -> str:
@@ -154,11 +154,11 @@ def _numbers(value: Field) -> list[int]:
     """Of a repeated number, packed or not."""
     if isinstance(value, int):
         return [_signed(value)]
-    found, place = [], 0
+    numbers, place = [], 0
     while place < len(value):
         number, place = _varint(value, place)
-        found.append(_signed(number))
-    return found
+        numbers.append(_signed(number))
+    return numbers
 
 
 def _signed(number: int) -> int:

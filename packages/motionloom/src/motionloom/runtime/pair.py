@@ -136,7 +136,7 @@ class PairSession:
 
     @cached_property
     def _network(self) -> Session:
-        weights = {**self.prior.weights, **self.tensors, "mean": self.mean, "std": self.std}
+        weights = dict(self.prior.weights, **self.tensors, mean=self.mean, std=self.std)
         return Session(self.graph, lambda: weights, device=self.prior.device)
 
     @cached_property

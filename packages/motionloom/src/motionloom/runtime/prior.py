@@ -33,9 +33,9 @@ class PriorSession:
     graphs: Mapping[str, bytes]
     """``prior`` and ``bind``."""
     device: str = "cpu"
-    given: Floats | None = None
-    """(width, patch * 2 * features) what a control adapter reads what is given with: for each frame of a token
-    first the given numbers, then the mask; None: nothing can be shown."""
+    control: Floats | None = None
+    """(width, patch * 2 * features) with which a control adapter reads what is known: for each frame of a token first
+    the known numbers, then the mask; None: nothing can be shown."""
 
     @property
     def modulated(self) -> bool:
@@ -65,8 +65,8 @@ class PriorSession:
 
     def bind(self, cond: Condition) -> Bound:
         """Everything that depends on the condition alone; raises MotionloomError where it lacks what is read."""
-        rows, words = cond.words.shape
-        if self.modulated and not words:
+        rows, count = cond.words.shape
+        if self.modulated and not count:
             raise MotionloomError(
                 "this network attends to word vectors and the condition has none; use its own text encoder"
             )
@@ -77,8 +77,8 @@ class PriorSession:
             text, keys, values = self._binding.run({"pooled": cond.pooled, "tokens": cond.tokens})
         else:
             [text] = self._binding.run({"pooled": cond.pooled})
-        nothing = np.zeros((rows, 0, 0), np.float32)
-        return Bound(text, keys, values, cond.words[:, None, None], cond.lengths, cond.flags, nothing)
+        words, nothing = cond.words[:, None, None], np.zeros((rows, 0, 0), np.float32)
+        return Bound(text, keys, values, words, cond.lengths, cond.flags, nothing)
 
     def __call__(self, state: Floats, level: int | NDArray[np.int64], bound: Bound) -> Floats:
         """States (rows, frames, features), standardised, at ``level`` (one, or one per row; 1 to T), denoised."""
@@ -86,16 +86,16 @@ class PriorSession:
         [tokens] = self._network.run(feeds, held=HELD)
         return self._inputs.frames(tokens, state.shape[1])
 
-    def show(self, bound: Bound, given: Floats, mask: NDArray[np.bool_]) -> Bound:
-        """The condition with what is given (rows, frames, features), standardised, where the mask is True, if it can be
-        shown; what is not given may be anything finite."""
-        if self.given is None:
+    def show(self, bound: Bound, known: Floats, mask: NDArray[np.bool_]) -> Bound:
+        """The condition with what is ``known`` (rows, frames, features), standardised, where the mask is True, if it
+        can be shown; elsewhere it may be anything finite."""
+        if self.control is None:
             return bound
-        seen = np.concatenate([np.where(mask, given, 0.0), mask], axis=-1, dtype=np.float32)
+        numbers = np.concatenate([np.where(mask, known, 0.0), mask], axis=-1, dtype=np.float32)
         if self.config.patch > 1:  # as of the state: a token may be part motion and part padding
-            seen *= valid_frames(bound.lengths, seen.shape[1])[..., None]
-        tokens = patches(seen, self.config.patch)
-        return bound._replace(shown=np.stack([row @ self.given.T for row in tokens]))
+            numbers *= valid_frames(bound.lengths, numbers.shape[1])[..., None]
+        tokens = patches(numbers, self.config.patch)
+        return bound._replace(shown=np.stack([row @ self.control.T for row in tokens]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,18 +132,15 @@ class Inputs:
         patch, width = self.config.patch, self.config.width
         count = -(-frames // patch)
         valid = np.pad(valid_frames(bound.lengths, frames), ((0, 0), (0, count * patch - frames)))
-        shown = bound.shown if bound.shown.size else np.zeros((rows, count, width), np.float32)
-        made = {
-            "shown": np.ascontiguousarray(shown, np.float32),
-            "text": np.ascontiguousarray(bound.text, np.float32),
-            "keys": np.ascontiguousarray(bound.keys, np.float32),
-            "values": np.ascontiguousarray(bound.values, np.float32),
+        known = bound.shown if bound.shown.size else np.zeros((rows, count, width), np.float32)
+        floats = {"shown": known, "text": bound.text, "keys": bound.keys, "values": bound.values}
+        arrays = {name: np.ascontiguousarray(one, np.float32) for name, one in floats.items()} | {
             "words": np.ascontiguousarray(bound.words.reshape(rows, -1)),
             "valid": valid.reshape(rows, count, patch).any(-1),
             "frames": valid,
         }
-        self._masks["last"] = bound, (rows, frames), made
-        return made
+        self._masks["last"] = bound, (rows, frames), arrays
+        return arrays
 
 
 def valid_frames(lengths: NDArray[np.int64], frames: int) -> NDArray[np.bool_]:

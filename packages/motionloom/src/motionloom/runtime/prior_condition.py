@@ -1,4 +1,4 @@
-"""What a prior's network is asked, and what becomes of it before the sampler's loop; one entry per row."""
+"""What a prior's network is conditioned on, and what becomes of it before the sampler's loop; one entry per row."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ Floats = NDArray[np.float32]
 
 
 class Condition(NamedTuple):
-    """What a motion is asked to be, one entry per row. Zeros in place of a text mean: no text."""
+    """What a motion is to be, one entry per row. Zeros in place of a text mean: no text."""
 
     pooled: Floats
     """(rows, text) one vector per text."""
@@ -51,13 +51,13 @@ def condition(
     rows, width = pooled.shape
     tokens = np.zeros((rows, 0, width), np.float32) if tokens is None else tokens
     words = np.ones(tokens.shape[:2], np.bool_) if words is None else words
-    valid = np.full(rows, -1, np.int64) if lengths is None else np.asarray(lengths, np.int64)
+    valid = np.asarray([-1] * rows if lengths is None else lengths, np.int64)
     flags = np.zeros((rows, 0), np.int64) if flags is None else flags
     return Condition(pooled, tokens, words, valid, flags)
 
 
 class Bound(NamedTuple):
-    """A condition as the network's layers want it; rows are the first axis of every part."""
+    """A condition as the network's layers need it; rows are the first axis of every part."""
 
     text: Floats
     """(rows, width) projected pooled text."""

@@ -1,7 +1,7 @@
 """Graphs that ONNX Runtime runs. No other module knows it.
 
-A session is made when it is first run, from a graph without weights and the arrays of a weight file. Arrays that go in
-stay where they are, and the buffers of its answers are kept from call to call.
+A session is created when it is first run, from a graph without weights and the arrays of a weight file. Arrays that
+go in stay where they are, and the buffers of its answers are kept from call to call.
 """
 
 import os
@@ -24,7 +24,7 @@ Weights: TypeAlias = Callable[[], Mapping[str, np.ndarray]]
 
 
 def set_threads(count: int | None) -> None:
-    """Let sessions that are made afterwards in this process compute with so many threads.
+    """Let sessions that are created afterwards in this process compute with so many threads.
 
     None: with as many as the environment variable ``MOTIONLOOM_THREADS`` says, else with one per core.
     """
@@ -35,13 +35,13 @@ def set_threads(count: int | None) -> None:
 
 
 def threads() -> int:
-    """Threads of sessions made now; 0: one per core."""
+    """Threads of sessions created now; 0: one per core."""
     if _threads is not None:
         return _threads
-    said = os.environ.get(THREADS, "")
-    if said and not (said.isascii() and said.isdigit() and 0 < int(said) <= 1024):
-        raise MotionloomError(f"{THREADS} is a number of threads from 1 on; got {said!r}")
-    return int(said or 0)
+    text = os.environ.get(THREADS, "")
+    if text and not (text.isascii() and text.isdigit() and 0 < int(text) <= 1024):
+        raise MotionloomError(f"{THREADS} is a number of threads from 1 on; got {text!r}")
+    return int(text or 0)
 
 
 def find_device(name: str) -> str:
@@ -64,7 +64,7 @@ class Session:
     """A graph and the arrays that are its weights."""
 
     def __init__(self, graph: bytes, weights: Weights, *, device: str = "cpu", seldom: bool = False) -> None:
-        """A session that is made when it is first run.
+        """A session that is created when it is first run.
 
         weights: called then. seldom: it is run a few times, so that a second copy of its weights, arranged for speed,
         is not worth it; a product of one row may then have other bits than the same row beside others.
@@ -77,7 +77,7 @@ class Session:
     def run(self, feeds: Mapping[str, np.ndarray], *, held: Sequence[str] = ()) -> list[np.ndarray]:
         """The graph's answers, new arrays, in their order.
 
-        feeds: an array for each input; what the graph does not ask for is left.
+        feeds: an array for each input; what the graph does not need is left.
         held: names of those that never change once they were given, which are not brought to the device again.
         Several threads may run one session at the same time.
         Raises MotionloomError where the graph cannot be run.
@@ -90,7 +90,8 @@ class Session:
                 self._own.io, self._own.held = session.io_binding(), {}
             io = self._own.io
             for name in names.inputs:
-                io.bind_ortvalue_input(name, self._brought(name, feeds[name], name in held))
+                value = self._brought(name, feeds[name], name in held)
+                io.bind_ortvalue_input(name, value)
             for name in names.outputs:
                 io.bind_output(name, "cpu")
             session.run_with_iobinding(io)
@@ -111,7 +112,7 @@ class Session:
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         arrays = {name: np.ascontiguousarray(weights[name], np.float32) for name in names.weights}
         values = [onnxruntime.OrtValue.ortvalue_from_numpy(array) for array in arrays.values()]
-        options.add_external_initializers(list(arrays), values)  # which copies them when the session is made
+        options.add_external_initializers(list(arrays), values)  # which copies them when the session is created
         if self._seldom:
             options.add_session_config_entry("session.disable_prepacking", "1")
         kind, _, number = self.device.partition(":")
@@ -125,13 +126,13 @@ class Session:
         """The array as a value on the session's device."""
         import onnxruntime
 
-        kept: dict[str, tuple[np.ndarray, Any]] = self._own.held
-        if held and name in kept and kept[name][0] is array:
-            return kept[name][1]
+        cache: dict[str, tuple[np.ndarray, Any]] = self._own.held
+        if held and name in cache and cache[name][0] is array:
+            return cache[name][1]
         kind, _, number = self.device.partition(":")
         value = onnxruntime.OrtValue.ortvalue_from_numpy(np.ascontiguousarray(array), kind, int(number or 0))
         if held:
-            kept[name] = array, value
+            cache[name] = array, value
         return value
 
 

@@ -1,7 +1,5 @@
 """Names and shapes of the weights of each network, as its settings say; what a file holds is checked against them."""
 
-from collections.abc import Iterator
-
 from motionloom.runtime.pair import PLACE, SEEN, PairConfig
 from motionloom.runtime.predictor import PredictorConfig
 from motionloom.runtime.sizes import NetConfig
@@ -12,7 +10,7 @@ Shapes = dict[str, tuple[int, ...]]
 def prior_shapes(config: NetConfig) -> Shapes:
     """Of a prior's network, without ``net.``."""
     width, numbers = config.width, config.patch * config.features
-    found = {
+    table = {
         **_linear("embed", numbers + config.patch * 4 * config.flags, width),
         **_linear("time1", width, width),
         **_linear("time2", width, width),
@@ -20,37 +18,37 @@ def prior_shapes(config: NetConfig) -> Shapes:
         **_linear("out", width, numbers),
     }
     if config.flags:
-        found["flag.weight"] = (2, 4)
+        table["flag.weight"] = (2, 4)
     if config.variant == "modulated":
-        found |= _linear("words", config.text, 2 * width * config.layers)
-        found |= _linear("change", width, 6 * width) | _linear("last", width, 2 * width)
+        table |= _linear("words", config.text, 2 * width * config.layers)
+        table |= _linear("change", width, 6 * width) | _linear("last", width, 2 * width)
         if config.clock:
-            found |= _linear("place", width, width) | _linear("clock", width, 2 * width)
+            table |= _linear("place", width, width) | _linear("clock", width, 2 * width)
     for layer in range(config.layers):
         block = _modulated(width, config.hidden) if config.variant == "modulated" else _encoder(width, config.hidden)
-        found |= _inside(f"blocks.{layer}", block)
-    return found
+        table |= _inside(f"blocks.{layer}", block)
+    return table
 
 
 def pair_shapes(config: PairConfig, prior: NetConfig) -> Shapes:
     """Of a communication block in such a prior."""
     modulated = prior.variant == "modulated"
     partner = prior.patch * (PLACE + 3 * len(SEEN)) if config.aware else 0
-    found = {
+    table = {
         **_linear("places", 2 * PLACE, config.width),
         **_linear("both", 2 * prior.width + partner, config.width),
         **_linear("place", config.width, PLACE),
         **(_linear("out", config.width, prior.width) if modulated else {}),
     }
     for layer in range(config.layers):
-        found |= _inside(f"blocks.{layer}", _encoder(config.width, config.hidden))
-    return found
+        table |= _inside(f"blocks.{layer}", _encoder(config.width, config.hidden))
+    return table
 
 
 def predictor_shapes(config: PredictorConfig) -> Shapes:
     """Of a predictor's network, without ``net.``."""
     width, (rows, channels) = config.width, config.condition_shape
-    found = {
+    table = {
         "sequence_embedding": (config.kept, width),
         **_linear("joint_embed", config.channels + config.beside * channels, width),
         **_linear("time_embed.0", width, width),
@@ -75,8 +73,8 @@ def predictor_shapes(config: PredictorConfig) -> Shapes:
     }
     for layer in range(config.layers):
         name = f"temporal_decoder_blocks.{layer}"
-        found |= _inside(f"{name}.sa_block", attention) | _inside(f"{name}.ffn", forward)
-    return found
+        table |= _inside(f"{name}.sa_block", attention) | _inside(f"{name}.ffn", forward)
+    return table
 
 
 def _encoder(width: int, hidden: int) -> Shapes:
@@ -114,9 +112,4 @@ def _norm(name: str, width: int) -> Shapes:
 
 
 def _inside(name: str, shapes: Shapes) -> Shapes:
-    return dict(_named(name, shapes))
-
-
-def _named(name: str, shapes: Shapes) -> Iterator[tuple[str, tuple[int, ...]]]:
-    for key, shape in shapes.items():
-        yield f"{name}.{key}", shape
+    return {f"{name}.{key}": shape for key, shape in shapes.items()}

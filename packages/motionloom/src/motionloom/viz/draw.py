@@ -59,21 +59,18 @@ class Camera:
 
     def see(self, points: Array) -> tuple[Array, Array, Array]:
         """Points (..., 3) to smooth-scale pixels (..., 2), depths (...) and pixels per metre (...)."""
-        seen = (points - self.target) @ self.axes().T
-        depth = np.maximum(self.distance - seen[..., 2], 0.05 * self.distance)
+        view = (points - self.target) @ self.axes().T
+        depth = np.maximum(self.distance - view[..., 2], 0.05 * self.distance)
         scale = SMOOTH * self.size[1] / self.span * self.distance / depth
-        x = SMOOTH * self.size[0] / 2 - self.corner[0] + seen[..., 0] * scale
-        y = SMOOTH * self.size[1] / 2 - self.corner[1] - seen[..., 1] * scale
+        x = SMOOTH * self.size[0] / 2 - self.corner[0] + view[..., 0] * scale
+        y = SMOOTH * self.size[1] / 2 - self.corner[1] - view[..., 1] * scale
         return np.stack([x, y], axis=-1), depth, scale
 
 
 def mix(a: Colour, b: Colour, amount: float) -> Colour:
     """A colour between a (0) and b (1)."""
-    return (
-        round(a[0] + (b[0] - a[0]) * amount),
-        round(a[1] + (b[1] - a[1]) * amount),
-        round(a[2] + (b[2] - a[2]) * amount),
-    )
+    red, green, blue = (round(x + (y - x) * amount) for x, y in zip(a, b))
+    return red, green, blue
 
 
 def shades(tint: Colour) -> dict[int, Colour]:
@@ -154,13 +151,13 @@ def paint_shadow(picture: Image.Image, camera: Camera, shape: Figure, frame: int
         return
     places = shape.places[frame].copy()
     places[:, 1] = shape.floor
-    seen, _, scale = camera.see(places)
+    xy, _, scale = camera.see(places)
     a, b = (np.array([bone[k] for bone in shape.bones]) for k in (0, 1))
     reach = 1.25 * shape.radii.max(axis=1) + 0.008 * shape.height
-    outlines = capsules(seen[a], seen[b], reach * scale[a], reach * scale[b])
+    outlines = capsules(xy[a], xy[b], reach * scale[a], reach * scale[b])
     squash = np.sin(camera.elevation) + 0.15
     if shape.hips:
-        seat = seen[shape.centre] + 0.07 * shape.height * scale[shape.centre] * np.stack(
+        seat = xy[shape.centre] + 0.07 * shape.height * scale[shape.centre] * np.stack(
             [np.cos(_ROUND), squash * np.sin(_ROUND)], axis=-1
         )
         outlines = [*outlines, seat]
@@ -201,13 +198,13 @@ def paint_body(
         pen.polygon(hull(at, 0.06 * shape.height * scale), fill=trunk)
         return
     places = shape.places[frame]
-    seen, depth, scale = camera.see(places)
+    xy, depth, scale = camera.see(places)
     parts: list[tuple[float, list[float], list[float], Colour]] = []
     a, b = (np.array([bone[k] for bone in shape.bones], dtype=int) for k in (0, 1))
     radius_a, radius_b = shape.radii[:, 0] * scale[a], shape.radii[:, 1] * scale[b]
     edge = max(1.0, 0.0052 * shape.height * float(scale[shape.centre]))
-    outer = capsules(seen[a], seen[b], radius_a + edge, radius_b + edge).reshape(len(a), -1).tolist()
-    inner = capsules(seen[a], seen[b], radius_a, radius_b).reshape(len(a), -1).tolist()
+    outer = capsules(xy[a], xy[b], radius_a + edge, radius_b + edge).reshape(len(a), -1).tolist()
+    inner = capsules(xy[a], xy[b], radius_a, radius_b).reshape(len(a), -1).tolist()
     inside = np.array([shape.sides[child] == 0 for _, child in shape.bones], dtype=bool)  # the neck starts in the chest
     middles = ((depth[a] + depth[b]) / 2 + 0.08 * shape.height * inside).tolist()
     for i, (parent, child) in enumerate(shape.bones):
@@ -216,11 +213,11 @@ def paint_body(
             parts.append((middles[i], outer[i], inner[i], CONTACT if planted else colours[shape.sides[child]]))
     for joints, radius in ((shape.chest, 0.047), (shape.hips, 0.056)):
         if joints:
-            at, r = seen[list(joints)], radius * shape.height * scale[list(joints)]
+            at, r = xy[list(joints)], radius * shape.height * scale[list(joints)]
             mean = float(depth[list(joints)].mean())
             parts.append((mean, _flat(hull(at, r + edge)), _flat(hull(at, r)), trunk))
     if shape.chest and shape.hips:
-        parts.append((*_waist(seen, depth, scale, shape, edge), trunk))
+        parts.append((*_waist(xy, depth, scale, shape, edge), trunk))
     parts += _head_parts(camera, shape, frame, edge, skin=skin)
     for _, outside, inside, colour in sorted(parts, key=lambda part: -part[0]):
         pen.polygon(outside, fill=mix(colour, INK, 0.55))
@@ -236,14 +233,12 @@ def _is_on_floor(shape: Figure, frame: int, parent: int, child: int) -> bool:
     return bool(low and shape.contacts[frame, child])
 
 
-def _waist(
-    seen: Array, depth: Array, scale: Array, shape: Figure, edge: float
-) -> tuple[float, list[float], list[float]]:
+def _waist(xy: Array, depth: Array, scale: Array, shape: Figure, edge: float) -> tuple[float, list[float], list[float]]:
     """The belly between pelvis and chest."""
     a, b = [shape.centre], [shape.chest[-1]]
     radii = [0.062 * shape.height * scale[j] for j in (a, b)]
-    outer = capsules(seen[a], seen[b], radii[0] + edge, radii[1] + edge)[0].ravel().tolist()
-    inner = capsules(seen[a], seen[b], *radii)[0].ravel().tolist()
+    outer = capsules(xy[a], xy[b], radii[0] + edge, radii[1] + edge)[0].ravel().tolist()
+    inner = capsules(xy[a], xy[b], *radii)[0].ravel().tolist()
     return float(depth[a[0]] + depth[b[0]]) / 2 + 1e-3, outer, inner
 
 
@@ -262,7 +257,7 @@ def _head_parts(
     parts: list[tuple[float, list[float], list[float], Colour]] = []
     nose_colour = mix(SKIN, LEFT, 0.45) if skin == SKIN else mix(skin, INK, 0.35)
     for point, r, colour in ((middle, radius, skin), (nose, 0.3 * radius, nose_colour)):
-        seen, depth, scale = camera.see(point[None])
-        outer, inner = (_flat(hull(seen, np.array([r * scale[0] + e]))) for e in (edge, 0.0))
+        xy, depth, scale = camera.see(point[None])
+        outer, inner = (_flat(hull(xy, np.array([r * scale[0] + e]))) for e in (edge, 0.0))
         parts.append((float(depth[0]), outer, inner, colour))
     return parts

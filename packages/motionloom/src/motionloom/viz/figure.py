@@ -14,7 +14,7 @@ from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])
-CONTACT_HEIGHT = 0.075  # of a body's height: a joint this low and slow stands on the floor
+CONTACT_HEIGHT = 0.075  # of a body's height: a joint this low and slow is on the floor
 CONTACT_SPEED = 0.25  # body heights per second
 
 
@@ -48,11 +48,11 @@ class Figure:
     head_is_tip: bool
     """The head's joint is the crown rather than the base of the skull."""
     centre: int
-    """The pelvis, or what stands for it."""
+    """The pelvis, or what takes its place."""
     height: float
     """Metres from floor to crown."""
     floor: float
-    """Height of the floor, metres."""
+    """Its height in metres: 0 where the motion plausibly stands on that, else about that of its lowest joints."""
 
     def __len__(self) -> int:
         return len(self.places)
@@ -89,11 +89,11 @@ def figure(motion: Motion) -> Figure:
     hidden = {below for j in face for below in skeleton.below(j)} - set(face)
     bones = tuple((skeleton.parents[j], j) for j in body if j != centre and j not in hidden)
     limbs = _limbs(skeleton, places, bones, sides)
-    floor = _floor(places[:, body], height)
+    lowest = float(np.percentile(places[:, body, 1].min(axis=1), 5))
+    floor = 0.0 if -0.06 * height < lowest < 0.12 * height else lowest
     forward = _forward(places, limbs, sides)
     arms = tuple(start for start, _, arm in limbs if arm)
     legs = tuple(start for start, _, arm in limbs if not arm)
-    chest = _chest(skeleton, arms, centre)
     whole = len(arms) >= 2 and len(legs) >= 2
     trunk = frozenset(j for limb in (*arms, *legs) for j in skeleton.ancestors(limb)) if whole else frozenset()
     return Figure(
@@ -105,11 +105,11 @@ def figure(motion: Motion) -> Figure:
         sides,
         bones,
         _radii(skeleton, places, bones, limbs, height),
-        chest if len(arms) >= 2 else (),
+        _chest(skeleton, arms, centre),
         (*legs, centre) if len(legs) >= 2 else (),
         trunk,
         head,
-        head is not None and _is_crown(skeleton, places, head[1], arms=arms, height=height),
+        head is not None and _is_crown(skeleton, places, head[1], arms, height),
         centre,
         height,
         floor,
@@ -122,7 +122,7 @@ def joint_sides(skeleton: Skeleton) -> tuple[int, ...]:
     if any(pair != j for j, pair in enumerate(pairs)):
         named = [_side_of_name(skeleton.names[j], skeleton.names[pair]) for j, pair in enumerate(pairs)]
         for j, parent in enumerate(skeleton.parents):
-            if named[j] == 0 and parent >= 0 and (j in skeleton.ends or named[parent] != 0):
+            if not named[j] and parent >= 0 and (j in skeleton.ends or named[parent]):
                 named[j] = named[parent]
         return tuple(named)
     x = skeleton.rest_positions()[:, 0] - skeleton.offsets[0, 0]
@@ -173,12 +173,6 @@ def body_start(skeleton: Skeleton, places: Array) -> int:
     return joint if skeleton.children(joint) else 0
 
 
-def _floor(places: Array, height: float) -> float:
-    """Zero where the motion plausibly stands on zero, else the height of its lowest joints."""
-    lowest = float(np.percentile(places[..., 1].min(axis=1), 5))
-    return 0.0 if -0.06 * height < lowest < 0.12 * height else lowest
-
-
 def _limbs(
     skeleton: Skeleton, places: Array, bones: tuple[tuple[int, int], ...], sides: tuple[int, ...]
 ) -> list[tuple[int, int, bool]]:
@@ -188,17 +182,17 @@ def _limbs(
     depth = [0] * len(skeleton)
     for joint, parent in enumerate(skeleton.parents[1:], start=1):
         depth[joint] = depth[parent] + 1
-    found: list[tuple[int, int, bool]] = []
+    limbs: list[tuple[int, int, bool]] = []
     for start in (c for p, c in bones if sides[c] != 0 and sides[p] == 0):
         inside = skeleton.below(start)
-        pairs = [(skeleton.parents[j], j) for j in inside if j != start and skeleton.children(j)]
+        pairs = [(skeleton.parents[j], j) for j in inside[1:] if skeleton.children(j)]
         if not pairs:
             continue
         best = max(pairs, key=lambda pair: lengths[pair[1]] + max(lengths[c] for c in skeleton.children(pair[1])))
         tip = max(inside, key=depth.__getitem__)
         rest_drop = height[tip] - height[start]
-        found.append((best[0], best[1], bool(rest_drop > -0.35 * np.ptp(height))))
-    return found
+        limbs.append((best[0], best[1], bool(rest_drop > -0.35 * np.ptp(height))))
+    return limbs
 
 
 def _chest(skeleton: Skeleton, arms: tuple[int, ...], centre: int) -> tuple[int, ...]:
@@ -243,7 +237,7 @@ def _head(skeleton: Skeleton, places: Array, body: list[int], sides: tuple[int, 
     return skeleton.parents[highest], highest
 
 
-def _is_crown(skeleton: Skeleton, places: Array, head: int, *, arms: tuple[int, ...], height: float) -> bool:
+def _is_crown(skeleton: Skeleton, places: Array, head: int, arms: tuple[int, ...], height: float) -> bool:
     """Whether the last joint of the head is its top and not the base of the skull: a head rises high over shoulders."""
     if not arms:
         return head in skeleton.ends

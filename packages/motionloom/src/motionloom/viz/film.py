@@ -16,7 +16,7 @@ MAX_FPS = 60.0
 MAX_GIF_FPS = 25.0
 MAX_GIF_FRAMES = 1500
 SAMPLED = 9
-"""Pictures of a GIF that its palette is made of."""
+"""Pictures of a GIF that its palette is from."""
 MAX_PIXELS = 4096 * 2304
 
 
@@ -30,7 +30,7 @@ def film_rate(path: str | Path, fastest: float, fps: float | None) -> float:
 
 
 def film_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Pixels made even, as H.264 wants them; raises `MotionloomError` below 64 x 64 and above 4096 x 2304."""
+    """Pixels in even numbers, as H.264 wants them; raises `MotionloomError` below 64 x 64 and above 4096 x 2304."""
     width, height = (int(v) // 2 * 2 for v in size)
     if min(width, height) < 64 or width * height > MAX_PIXELS:
         raise MotionloomError(f"a film is 64x64 to 4096x2304 pixels; got {size[0]}x{size[1]}")
@@ -72,12 +72,12 @@ def find_ffmpeg() -> str:
 
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except (ImportError, RuntimeError):
-        found = shutil.which("ffmpeg")
-    if found is None:
+        program = shutil.which("ffmpeg")
+    if program is None:
         raise MotionloomError(
             "there is no ffmpeg to write .mp4 with; pip install 'motionloom[film]' brings one; or write a .gif"
         )
-    return found
+    return program
 
 
 def _is_gif(path: str | Path) -> bool:
@@ -86,9 +86,9 @@ def _is_gif(path: str | Path) -> bool:
 
 def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int], fps: float, *, ffmpeg: str) -> None:
     """Pipe raw pictures into ffmpeg: an argument list, no shell, an absolute path."""
-    read = f"-f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {fps:.6f} -i - -an"
-    written = "-c:v libx264 -preset veryfast -crf 20 -pix_fmt yuv420p -movflags +faststart -f mp4"
-    options = f"-y -loglevel error {read} {written}".split()
+    source = f"-f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {fps:.6f} -i - -an"
+    encoding = "-c:v libx264 -preset veryfast -crf 20 -pix_fmt yuv420p -movflags +faststart -f mp4"
+    options = f"-y -loglevel error {source} {encoding}".split()
     command = [ffmpeg, *options, f"file:{path.absolute()}"]
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(
@@ -125,7 +125,7 @@ def _write_gif(frames: Callable[[Sequence[int]], Iterator[Image.Image]], path: P
 def _palette(pictures: Iterator[Image.Image], number: int) -> Image.Image:
     """The colours of so many pictures, which are thinned: together they have no more points than one of them."""
     step = int(np.ceil(np.sqrt(number)))
-    points = [np.asarray(picture)[::step, ::step].reshape(-1, 3) for picture in pictures]
+    points = [np.asarray(one)[::step, ::step].reshape(-1, 3) for one in pictures]
     together = Image.fromarray(np.concatenate(points)[None])
     return together.quantize(256, Image.Quantize.MAXCOVERAGE)  # thin lines keep their own colours
 

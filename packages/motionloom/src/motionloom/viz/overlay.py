@@ -17,18 +17,9 @@ from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
 from motionloom.viz import draw
 from motionloom.viz.draw import SMOOTH, Array, Camera, Colour
-from motionloom.viz.film import (
-    caption as one_line,
-)
-from motionloom.viz.film import (
-    film_rate,
-    film_size,
-    font,
-    shorten,
-    suffixed,
-    write_film,
-)
-from motionloom.viz.scene import Actor, Shot, Stage, azimuth_of, extent, follow, needed_span
+from motionloom.viz.film import caption as one_line
+from motionloom.viz.film import film_rate, film_size, font, shorten, suffixed, write_film
+from motionloom.viz.scene import Actor, Shot, Stage, azimuth_of, extent, follow, span_of
 
 PALETTE: tuple[Colour, ...] = (
     (0, 114, 178),
@@ -192,20 +183,20 @@ def _paint(
 
 def _paint_sticks(pen: ImageDraw.ImageDraw, camera: Camera, shot: Shot) -> None:
     """The bones of a translucent body as lines in its full colour, over everything: they stay readable in a crowd."""
-    seen, depth, scale = camera.see(shot.shape.places[shot.frame])
+    xy, depth, scale = camera.see(shot.shape.places[shot.frame])
     thick = max(2, round(0.009 * shot.shape.height * float(np.median(scale))))
     shades = draw.shades(shot.actor.colour)
     for parent, child in sorted(shot.shape.bones, key=lambda bone: -float(depth[bone[1]])):
-        line = [tuple(seen[parent].tolist()), tuple(seen[child].tolist())]
+        line = [tuple(xy[parent].tolist()), tuple(xy[child].tolist())]
         pen.line(line, fill=shades[shot.shape.sides[child]], width=thick)
 
 
 def _paint_shot(picture: Image.Image, camera: Camera, shot: Shot) -> None:
     """One body, blended as a whole over what is there, so that its own parts do not shine through each other."""
-    seen, _, scale = camera.see(shot.points())
+    xy, _, scale = camera.see(shot.points())
     margin = 0.16 * shot.shape.height * scale.max() + 4
-    low = np.clip(np.floor(seen.min(axis=0) - margin), 0, picture.size).astype(int)
-    high = np.clip(np.ceil(seen.max(axis=0) + margin), 0, picture.size).astype(int)
+    low = np.clip(np.floor(xy.min(axis=0) - margin), 0, picture.size).astype(int)
+    high = np.clip(np.ceil(xy.max(axis=0) + margin), 0, picture.size).astype(int)
     if (high <= low).any():
         return
     box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
@@ -299,7 +290,7 @@ def _panels(stage: Stage, views: Sequence[Sequence[Shot]], azimuth: float) -> li
     extents = [extent(shots, axes) for shots in views]
     margin = 0.1 * stage.height
     fill = ((WIDE - 20) / PANEL, 1 - 2 * 14 / PANEL)
-    spans = [needed_span(shots, axes, np.mean(e, axis=0), fill=fill, margin=margin) for shots, e in zip(views, extents)]
+    spans = [span_of(shots, axes, np.mean(e, axis=0), fill=fill, margin=margin) for shots, e in zip(views, extents)]
     span = max(1.2 * stage.height, *spans)
     cameras = []
     for low, high in extents:
@@ -324,7 +315,7 @@ def _map(stage: Stage, azimuth: float) -> Image.Image:
     metre = 10.0 ** max(0, int(np.floor(np.log10(max(span / 2, 1.0)))))
     edges = [np.arange(np.ceil((m - span / 2) / metre), (m + span / 2) / metre) * metre for m in middle]
 
-    def put(points: Array) -> list[tuple[float, float]]:
+    def project(points: Array) -> list[tuple[float, float]]:
         flat = (points - middle) * (big / span) * [1, -1] + big / 2
         return [(x, y) for x, y in flat.tolist()]
 
@@ -332,15 +323,15 @@ def _map(stage: Stage, azimuth: float) -> Image.Image:
         for at in lines.tolist():
             ends = np.array([[at, at], [at, at]])
             ends[:, 1 - k] = middle[1 - k] + np.array([-span, span]) / 2
-            pen.line(put(ends), fill=draw.TILE, width=2)
+            pen.line(project(ends), fill=draw.TILE, width=2)
     for (actor, shape, _), way in zip(stage.cast, ways):
         colour = draw.mix(draw.PAPER, actor.colour, 0.3 + 0.7 * actor.opacity)
         if len(way) > 1:
-            pen.line(put(way), fill=colour, width=5, joint="curve")
+            pen.line(project(way), fill=colour, width=5, joint="curve")
         nose = way[-1] + 0.07 * span * plane @ shape.forward[-1, [0, 2]]
         if actor.stays:
-            pen.line(put(np.stack([way[-1], nose])), fill=colour, width=3)
-        (x, y), (u, v) = put(way[[0, -1]])
+            pen.line(project(np.stack([way[-1], nose])), fill=colour, width=3)
+        (x, y), (u, v) = project(way[[0, -1]])
         if actor.start == 0:
             pen.ellipse((x - 9, y - 9, x + 9, y + 9), fill=(255, 255, 255), outline=colour, width=4)
         pen.ellipse((u - 9, v - 9, u + 9, v + 9), fill=colour)

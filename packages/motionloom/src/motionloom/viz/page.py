@@ -115,17 +115,17 @@ def page(takes: Sequence[Take], *, character: Character | None = None, most: int
             "them (--start, --end)",
             stacklevel=2,
         )
-    given = iter(zip((len(one[::step]) for one in places), data))
-    listed = [
+    parts = iter(zip((len(one[::step]) for one in places), data))
+    entries = [
         {
             "name": take.name,
             "fps": take.people[0].fps / step,
-            "people": [{"frames": frames, "data": text} for frames, text in islice(given, len(take.people))],
+            "people": [{"frames": frames, "data": text} for frames, text in islice(parts, len(take.people))],
         }
         for take in takes
     ]
-    title = " | ".join(dict.fromkeys(take["name"] for take in listed if take["name"]))[:200]
-    return _filled(template, title or "motionloom", {"takes": listed, "unit": UNIT, "character": body})
+    title = " | ".join(dict.fromkeys(take["name"] for take in entries if take["name"]))[:200]
+    return _filled(template, title or "motionloom", {"takes": entries, "unit": UNIT, "character": body})
 
 
 def framed(motion: Motion, *, height: int = 420) -> str:
@@ -165,15 +165,15 @@ def _packed(places: Sequence[np.ndarray], step: int) -> list[str]:
 
     Whole numbers of `UNIT`, joint after joint, all low bytes before all higher ones, so that equal ones are near.
     """
-    found = []
+    texts = []
     for one in places:
-        kept = one[::step].copy()
-        kept[:, 1:] -= kept[:, :1]
-        whole = np.rint(kept.reshape(len(kept), -1) / UNIT).clip(-(2**30), 2**30).astype("<i4")
-        changes = np.ascontiguousarray(np.diff(whole, axis=0, prepend=0).astype("<i4").T)
-        planes = changes.view(np.uint8).reshape(-1, 4).T.tobytes()
-        found.append(_deflated(planes))
-    return found
+        frames = one[::step].copy()
+        frames[:, 1:] -= frames[:, :1]
+        whole = np.rint(frames.reshape(len(frames), -1) / UNIT).clip(-(2**30), 2**30).astype("<i4")
+        steps = np.ascontiguousarray(np.diff(whole, axis=0, prepend=0).astype("<i4").T)
+        planes = steps.view(np.uint8).reshape(-1, 4).T.tobytes()
+        texts.append(_deflated(planes))
+    return texts
 
 
 def _animated(character: Character, people: Sequence[Motion]) -> str:
@@ -215,38 +215,38 @@ def _without(data: bytes, animations: Sequence[dict]) -> bytes:
     views, accessors = document.get("bufferViews", []), document.pop("accessors", [])
     used = _numbers(document.get("meshes")) | _numbers([document.get("skins"), document["nodes"]], _MATRICES)
     lost = _numbers(list(animations), ("samplers",)) - _numbers(document["animations"], ("samplers",)) - used
-    kept = _numbers([one for number, one in enumerate(accessors) if number not in lost], ("bufferView",))
-    kept |= _numbers(document, ("bufferView",))
+    needed = _numbers([one for number, one in enumerate(accessors) if number not in lost], ("bufferView",))
+    needed |= _numbers(document, ("bufferView",))
     if any(view.get("extensions") or view.get("buffer", 0) for view in views):
         return data
     empty = np.zeros(len(data), bool)
     for keep in (False, True):
         for number, view in enumerate(views):
-            if (number in kept) == keep:
+            if (number in needed) == keep:
                 start = 28 + length + view.get("byteOffset", 0)
                 empty[start : start + view["byteLength"]] = not keep
     return np.where(empty, np.uint8(0), np.frombuffer(data, np.uint8)).tobytes()
 
 
-def _numbers(found: object, keys: Sequence[str] = ()) -> set[int]:
+def _numbers(tree: object, keys: Sequence[str] = ()) -> set[int]:
     """Whole numbers anywhere in JSON, or those of some keys alone."""
-    if isinstance(found, dict):
-        inside = (_numbers(value, () if key in keys else keys) for key, value in found.items())
+    if isinstance(tree, dict):
+        inside = (_numbers(value, () if key in keys else keys) for key, value in tree.items())
         return set().union(*inside)
-    if isinstance(found, list):
-        return set().union(*(_numbers(value, keys) for value in found))
-    return {found} if isinstance(found, int) and not keys else set()
+    if isinstance(tree, list):
+        return set().union(*(_numbers(value, keys) for value in tree))
+    return {tree} if isinstance(tree, int) and not keys else set()
 
 
 def _deflated(data: bytes) -> str:
     return base64.b64encode(zlib.compress(data, 9)).decode()
 
 
-def _filled(template: str, title: str, given: dict) -> str:
+def _filled(template: str, title: str, content: dict) -> str:
     """The viewer with a title and with what it shows; letters that are none (half of a pair) become question marks."""
     if template.count("".join(_MOTION)) != 1 or template.count(_TITLE) != 1:
         raise MotionloomError(f"{VIEWER} is not the viewer of this version; build it again by 'make page'")
-    text = json.dumps(given).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    text = json.dumps(content).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     whole = template.replace("".join(_MOTION), text.join(_MOTION))
-    shown = html.escape(title.encode("utf-8", "replace").decode())
-    return whole.replace(_TITLE, f"<title>{shown}</title>", 1)
+    title = html.escape(title.encode("utf-8", "replace").decode())
+    return whole.replace(_TITLE, f"<title>{title}</title>", 1)

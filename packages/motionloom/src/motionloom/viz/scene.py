@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.viz.draw import PAPER, Array, Camera, Colour, mix
 from motionloom.viz.figure import Figure, figure
@@ -58,7 +59,7 @@ class Stage:
         sampled = [_sampled(actor, rate) for actor in actors]
         shapes: dict[int, Figure] = {}
         for members in _alike(sampled):
-            whole = figure(_joined([sampled[i] for i in members]))
+            whole = figure(joined([sampled[i] for i in members]))
             ends = np.cumsum([len(sampled[i]) for i in members])
             shapes |= {i: _part(whole, end - len(sampled[i]), end) for i, end in zip(members, ends.tolist())}
         self.floor = min(shape.floor for shape in shapes.values())
@@ -68,12 +69,12 @@ class Stage:
 
     def shots(self, time: int) -> list[Shot]:
         """Everybody who is there at a frame of the scene."""
-        found = []
+        shots = []
         for actor, shape, first in self.cast:
             frame = min(time - first, len(shape) - 1) if actor.stays else time - first
             if 0 <= frame < len(shape):
-                found.append(Shot(actor, shape, frame, actor.opacity))
-        return found
+                shots.append(Shot(actor, shape, frame, actor.opacity))
+        return shots
 
     def trails(self, time: int) -> list[tuple[Array, Colour]]:
         """Everybody's way on the floor in the last seconds before a frame of the scene, and its colour."""
@@ -111,21 +112,6 @@ def _alike(motions: Sequence[Motion]) -> list[list[int]]:
         else:
             group.append(i)
     return groups
-
-
-def _joined(motions: Sequence[Motion]) -> Motion:
-    """Motions of one skeleton and rate, one after the other."""
-    moved = None
-    if any(m.translations is not None for m in motions):
-        rest = motions[0].skeleton.offsets
-        moved = np.concatenate(
-            [
-                np.broadcast_to(rest, (len(m), *rest.shape)) if m.translations is None else m.translations
-                for m in motions
-            ]
-        )
-    root, turned = (np.concatenate([getattr(m, name) for m in motions]) for name in ("root", "rotations"))
-    return replace(motions[0], root=root, rotations=turned, translations=moved)
 
 
 def _part(whole: Figure, start: int, stop: int) -> Figure:
@@ -168,21 +154,19 @@ def _scatter(points: Array) -> Array:
 
 def extent(shots: Sequence[Shot], axes: Array) -> tuple[Array, Array]:
     """Lowest and highest coordinates of people along a camera's axes, (3,) metres each."""
-    seen = np.concatenate([s.points() for s in shots]) @ axes.T
-    return seen.min(axis=0), seen.max(axis=0)
+    view = np.concatenate([s.points() for s in shots]) @ axes.T
+    return view.min(axis=0), view.max(axis=0)
 
 
-def needed_span(
-    shots: Sequence[Shot], axes: Array, middle: Array, *, fill: tuple[float, float], margin: float
-) -> float:
+def span_of(shots: Sequence[Shot], axes: Array, middle: Array, *, fill: tuple[float, float], margin: float) -> float:
     """The span that shows people whole around a point ``middle`` (3,) of the camera's axes.
 
     A point x beside and z before the target is seen at x d / (d - z) for an eye at d = 3.2 spans; it is within
     ``fill`` (width and height of what may be used, in picture heights) where span >= 2 x / fill + z / 3.2.
     """
-    seen = np.concatenate([s.points() for s in shots]) @ axes.T - middle
-    beside = np.maximum(*(2 * (np.abs(seen[:, k]) + margin) / fill[k] for k in (0, 1)))
-    return float((beside + np.maximum(seen[:, 2], 0.0) / 3.2).max())
+    view = np.concatenate([s.points() for s in shots]) @ axes.T - middle
+    beside = np.maximum(*(2 * (np.abs(view[:, k]) + margin) / fill[k] for k in (0, 1)))
+    return float((beside + np.maximum(view[:, 2], 0.0) / 3.2).max())
 
 
 def follow(stage: Stage, count: int, size: tuple[int, int]) -> list[Camera]:
@@ -197,7 +181,7 @@ def follow(stage: Stage, count: int, size: tuple[int, int]) -> list[Camera]:
     middles = smoothed(middles, width)
     fill = (size[0] / size[1] - 0.04, max(0.5, 1 - 2 * 46 / size[1]))
     margin = 0.1 * stage.height
-    spans = [needed_span(c, axes, m, fill=fill, margin=margin) for c, m in zip(crowds, middles)]
+    spans = [span_of(c, axes, m, fill=fill, margin=margin) for c, m in zip(crowds, middles)]
     reach = int(np.ceil(2.5 * width))
     padded = np.pad(np.array(spans), reach, mode="edge")
     widest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
@@ -210,4 +194,4 @@ def smoothed(values: Array, width: float) -> Array:
     reach = int(np.ceil(2.5 * width))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(width, 1e-6)) ** 2)
     padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T], axis=-1)
+    return np.stack([np.convolve(column, kernel / kernel.sum(), "valid") for column in padded.T], axis=-1)

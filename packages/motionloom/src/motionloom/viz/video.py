@@ -117,22 +117,22 @@ def _map(shape: Figure, side: int) -> Image.Image:
     span = max(float(np.ptp(way, axis=0).max()) * 1.25, 1.6 * shape.height)
     scale = big / span
 
-    def put(points: Array) -> list[tuple[float, float]]:
+    def project(points: Array) -> list[tuple[float, float]]:
         return [(big / 2 + x * scale, big / 2 - y * scale) for x, y in (points - middle).tolist()]
 
     metre = 10.0 ** max(0, int(np.floor(np.log10(max(span / 2, 1.0)))))
     for k in range(int(np.floor((middle - span).min() / metre)), int(np.ceil((middle + span).max() / metre)) + 1):
-        (x, _), (_, y) = put(np.array([[k * metre, 0.0], [0.0, k * metre]]))
+        (x, _), (_, y) = project(np.array([[k * metre, 0.0], [0.0, k * metre]]))
         pen.line([(x, 0), (x, big)], fill=draw.TILE, width=2)
         pen.line([(0, y), (big, y)], fill=draw.TILE, width=2)
     if len(way) > 1:
-        pen.line(put(way), fill=draw.PATH, width=5, joint="curve")
+        pen.line(project(way), fill=draw.PATH, width=5, joint="curve")
     step = max(1, round(shape.fps * max(0.5, shape.seconds / 16)))
     for frame in range(0, len(way), step):
         nose = way[frame] + 0.11 * span * plane @ shape.forward[frame, [0, 2]]
-        pen.line(put(np.stack([way[frame], nose])), fill=draw.mix(draw.PATH, draw.PAPER, 0.35), width=3)
+        pen.line(project(np.stack([way[frame], nose])), fill=draw.mix(draw.PATH, draw.PAPER, 0.35), width=3)
     for point, fill in ((way[0], draw.PAPER), (way[-1], draw.PATH)):
-        (x, y) = put(point[None])[0]
+        (x, y) = project(point[None])[0]
         pen.ellipse((x - 11, y - 11, x + 11, y + 11), fill=fill, outline=draw.PATH, width=4)
     small = picture.reduce(draw.SMOOTH)
     pen = ImageDraw.Draw(small)
@@ -187,9 +187,9 @@ def _film(
         for i, shape in enumerate(shapes):
             frame = min(k, len(shape) - 1)
             tile = _scene(shape, frame, cameras[i][frame])
-            letters = 18 if tile.width > 400 else 13
-            title = shorten(texts[i], letters, tile.width - 24)
-            ImageDraw.Draw(tile).text((12, 10), title, fill=draw.INK, font=font(letters))
+            height = 18 if tile.width > 400 else 13
+            title = shorten(texts[i], height, tile.width - 24)
+            ImageDraw.Draw(tile).text((12, 10), title, fill=draw.INK, font=font(height))
             picture.paste(tile, (panel[0] * (i % columns), panel[1] * (i // columns)))
         clock = f"{k / shapes[0].fps:.1f} / {seconds:.1f} s"
         pen = ImageDraw.Draw(picture)
@@ -225,7 +225,7 @@ def _captions(motions: Sequence[Motion], captions: Sequence[str] | None) -> list
         raise MotionloomError("there is no motion to draw; give at least one")
     if captions is not None and len(captions) != len(motions):
         raise MotionloomError(f"{len(motions)} motions need as many captions; got {len(captions)}")
-    return [caption(c) for c in captions] if captions is not None else [""] * len(motions)
+    return [""] * len(motions) if captions is None else [caption(c) for c in captions]
 
 
 # --- grids --------------------------------------------------------------------------------------------------------
@@ -283,8 +283,8 @@ def _tile(shape: Figure, text: str, poses: int, mark: Colour | None) -> Image.Im
     camera = _grid_camera(shape, frames)
     for column, frame in enumerate(frames.tolist()):
         here = np.array([shape.path[frame, 0], camera.target[1], shape.path[frame, 2]])
-        moved = Camera(here, POSE, camera.span, camera.azimuth, camera.elevation)
-        tile.paste(_scene(shape, frame, moved, ahead=False), (POSE[0] * column, CAPTION))
+        view = Camera(here, POSE, camera.span, camera.azimuth, camera.elevation)
+        tile.paste(_scene(shape, frame, view, ahead=False), (POSE[0] * column, CAPTION))
     pen = ImageDraw.Draw(tile)
     if mark is not None:
         pen.rectangle((0, 0, 5, CAPTION - 3), fill=mark)
@@ -300,7 +300,7 @@ def _grid_camera(shape: Figure, frames: np.ndarray) -> Camera:
     around = shape.places[frames] - shape.path[frames, None]
     top = max(float(around[..., 1].max()) + 0.12 * shape.height, 0.6 * shape.height)
     low = min(float(around[..., 1].min()), 0.0)
-    azimuth = float(np.arctan2(shape.forward[0, 0], shape.forward[0, 2])) - 0.75
+    azimuth = _facing(shape) - 0.75
     trial = Camera(np.zeros(3), POSE, 1.0, azimuth)
     wide = 2 * float(np.abs(around @ trial.axes()[0]).max()) + 0.15 * shape.height
     span = max(1.02 * (top - low) + 0.12 * shape.height, wide * POSE[1] / POSE[0])

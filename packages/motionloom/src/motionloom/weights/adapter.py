@@ -3,7 +3,7 @@
 A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). All are merged into the weights, those that
 are taught from a few clips each with a factor (`merged`). An adapter for control may also add an input: the
 network then sees which numbers are given and what they are, through embed(x) + U_g D_g [given, mask]. In the state
-itself they are scaled by the signal, which is next to nothing at the levels where it is decided what will be shown. The
+itself they are scaled by the signal, which is next to nothing at the levels where the motion is decided. The
 published control models are full fine-tunes and have the state alone (Shafir et al. 2024, algorithm 1); those are
 ordinary priors.
 """
@@ -83,17 +83,18 @@ class Adapter:
         Raises `MotionloomError` for a file that is missing, damaged or too large, and for another prior's adapter.
         """
         path = ADAPTERS.find(adapter)
-        found = read_adapter(path)
-        found.check_prior(prior, path.name)
-        changed = layers(prior.net, taught=found.taught)
-        check(found.tensors, dict(_shapes(found, prior.net.config, changed)), str(path))
-        return found
+        result = read_adapter(path)
+        result.check_prior(prior, path.name)
+        changed = layers(prior.net, taught=result.taught)
+        shapes = dict(_shapes(result, prior.net.config, changed))
+        check(result.tensors, shapes, str(path))
+        return result
 
     @property
     def captions(self) -> tuple[str, ...]:
         """The sentences that it was taught, where it was."""
-        said = self.notes.get("captions", [])
-        return tuple(text for text in said if isinstance(text, str)) if isinstance(said, list) else ()
+        texts = self.notes.get("captions", [])
+        return tuple(text for text in texts if isinstance(text, str)) if isinstance(texts, list) else ()
 
     def check_prior(self, prior: HasNet, file: str = "") -> None:
         """Raise `MotionloomError` where it belongs to another prior; ``file``: what the sentence calls it."""
@@ -121,11 +122,13 @@ def read_adapter(path: Path) -> Adapter:
     """What a file holds and says, without a prior to fit it to; raises MotionloomError as `Adapter.load`."""
     about, tensors = ADAPTERS.read(path)
     with ADAPTERS.parsing(path):
-        rank, notes, said = about["rank"], about.get("notes", {}), {key: about[key] for key in _TEXTS}
-        good = isinstance(rank, int) and not isinstance(rank, bool) and 1 <= rank <= MAX_RANK
-        if not good or not isinstance(notes, dict) or not all(isinstance(value, str) for value in said.values()):
+        rank, notes = about["rank"], about.get("notes", {})
+        texts = {key: about[key] for key in _TEXTS}
+        good = type(rank) is int and 1 <= rank <= MAX_RANK
+        if not good or not isinstance(notes, dict) or not all(isinstance(value, str) for value in texts.values()):
             raise ValueError("values of the wrong kind")
-    return Adapter(rank=rank, tensors={k: v.astype(np.float32) for k, v in tensors.items()}, notes=notes, **said)
+    tensors = {key: value.astype(np.float32) for key, value in tensors.items()}
+    return Adapter(rank=rank, tensors=tensors, notes=notes, **texts)
 
 
 def fingerprint(net: PriorSession) -> str:
@@ -146,10 +149,10 @@ def layers(net: PriorSession, *, taught: bool = False) -> dict[str, np.ndarray]:
     """Weights (out, in) of the layers of a network that an adapter changes, by name; ``taught``: also those that read
     the text."""
     names = (*CHANGED, *READS) if taught else CHANGED
-    found = {key.removeprefix(NET).removesuffix(".weight"): key for key in net.weights if key.endswith(".weight")}
+    keys = {key.removeprefix(NET).removesuffix(".weight"): key for key in net.weights if key.endswith(".weight")}
     return {
         name: net.weights[key]
-        for name, key in found.items()
+        for name, key in keys.items()
         if name.rsplit(".", 1)[-1] in names and net.weights[key].ndim == 2
     }
 
@@ -173,11 +176,12 @@ def merged(net: PriorSession, adapters: Sequence[tuple[Adapter, float]]) -> Prio
 
 def adapted(net: PriorSession, adapter: Adapter) -> PriorSession:
     """The network with the adapter merged into its weights, as quick as the network itself; it may be shown what is
-    given (`PriorSession.show`)."""
+    known (`PriorSession.show`)."""
     changed = _changed(net, [(adapter, 1.0)])
     if not adapter.sees_given:
         return changed
-    return replace(changed, given=adapter.tensors[f"{GIVEN}.up"] @ adapter.tensors[f"{GIVEN}.down"])
+    up, down = (adapter.tensors[f"{GIVEN}.{part}"] for part in ("up", "down"))
+    return replace(changed, control=up @ down)
 
 
 def _changed(net: PriorSession, adapters: Sequence[tuple[Adapter, float]]) -> PriorSession:

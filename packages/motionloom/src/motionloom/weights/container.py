@@ -1,7 +1,7 @@
 """Weight files: one container for all kinds, and weights out of them against the network that is to have them.
 
 A file is a safetensors file with a JSON description under one key of its head, which says of what kind it is. Nothing
-in it is ever executed; what it claims is checked before anything of that size is made.
+in it is ever executed; what it claims is checked before anything of that size is allocated.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ FORMAT = 1
 MAX_BYTES = 2 << 30
 GRAPH = "graph."
 """What names of graphs begin with."""
-_WRONG = (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
+_BAD = (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
 """What comes of descriptions that say something else than was expected."""
 
 
@@ -67,7 +67,7 @@ class Container:
             with safe_open(path, framework="np") as file:
                 head = file.metadata() or {}
             return self.key in head and (not self.kind or plain_json(head[self.key])["kind"] == self.kind)
-        except (SafetensorError, OSError, *_WRONG):
+        except (SafetensorError, OSError, *_BAD):
             return False
 
     def read(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -97,7 +97,7 @@ class Container:
             yield
         except MotionloomError:
             raise
-        except _WRONG as error:
+        except _BAD as error:
             reason = " ".join(str(error).split())[:160] or "it says something else"
             raise MotionloomError(
                 f"{path} does not describe a motionloom {self.noun}; name a file that does, or make it again ({reason})"
@@ -108,9 +108,10 @@ class Container:
         path = Path(path)
         if path.suffix != ".safetensors":
             raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
-        about = {"format": FORMAT, **({"kind": self.kind} if self.kind else {}), **about}
-        kept = {key: np.asarray(value, order="C") for key, value in tensors.items()}
-        return save_tensors(kept, path, metadata={self.key: json.dumps(about, default=dict)})
+        kind = {"kind": self.kind} if self.kind else {}
+        about = {"format": FORMAT, **kind, **about}
+        arrays = {key: np.asarray(value, order="C") for key, value in tensors.items()}
+        return save_tensors(arrays, path, metadata={self.key: json.dumps(about, default=dict)})
 
 
 def _a(noun: str) -> str:
@@ -131,11 +132,12 @@ def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, np.n
         with safe_open(path, framework="np") as file:
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
             head = dict(file.metadata() or {})
-        odd = next((value.dtype for value in tensors.values() if value.dtype.kind not in "biuf"), None)
+        types = [value.dtype for value in tensors.values()]
+        odd = next((one for one in types if one.kind not in "biuf"), None)
         if odd is not None:  # bfloat16 and the like are numbers to NumPy only where ml_dtypes is installed too
             raise ValueError(f"{odd} is no number that NumPy computes with; write float16 or float32")
         return tensors, head
-    except (SafetensorError, OSError, *_WRONG, RuntimeError) as error:
+    except (SafetensorError, OSError, *_BAD, RuntimeError) as error:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(
@@ -149,18 +151,18 @@ def halved(weights: Mapping[str, np.ndarray], half: bool = True) -> dict[str, np
     return {key: value.astype(np.float16 if half else np.float32) for key, value in weights.items()}
 
 
-def check(weights: Mapping[str, np.ndarray], wanted: Mapping[str, Sequence[int]], what: str) -> None:
+def check(weights: Mapping[str, np.ndarray], shapes: Mapping[str, Sequence[int]], what: str) -> None:
     """Raise MotionloomError unless the weights have just these names and shapes and finite floating-point numbers.
 
     what: how the sentence calls them, such as a path.
     """
-    found = {key: tuple(value.shape) for key, value in weights.items()}
-    right = {key: tuple(shape) for key, shape in wanted.items()}
-    wrong = sorted(key for key in right.keys() | found.keys() if right.get(key) != found.get(key))
+    own = {key: tuple(value.shape) for key, value in weights.items()}
+    right = {key: tuple(shape) for key, shape in shapes.items()}
+    wrong = sorted(key for key in right.keys() | own.keys() if right.get(key) != own.get(key))
     if wrong:
         key = wrong[0]
         raise MotionloomError(
-            f"{what} does not hold the weights it should: {key} is {found.get(key, 'missing')}, "
+            f"{what} does not hold the weights it should: {key} is {own.get(key, 'missing')}, "
             f"not {right.get(key, 'absent')}; fetch or train it again"
         )
     for key, value in weights.items():
@@ -180,8 +182,8 @@ def finite(values: np.ndarray) -> bool:
 
 def split_graphs(tensors: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
     """The tensors of a file without its graphs, and these by their names (``prior``, ``bind`` ...)."""
-    weights = {key: value for key, value in tensors.items() if not key.startswith(GRAPH)}
-    return weights, {key[len(GRAPH) :]: tensors[key].tobytes() for key in tensors.keys() - weights.keys()}
+    weights = {k: v for k, v in tensors.items() if not k.startswith(GRAPH)}
+    return weights, {k[len(GRAPH) :]: tensors[k].tobytes() for k in tensors.keys() - weights.keys()}
 
 
 def graph_tensors(graphs: Mapping[str, bytes]) -> dict[str, np.ndarray]:
@@ -189,9 +191,9 @@ def graph_tensors(graphs: Mapping[str, bytes]) -> dict[str, np.ndarray]:
     return {GRAPH + name: np.frombuffer(graph, np.uint8) for name, graph in graphs.items()}
 
 
-def check_graphs(path: Path, graphs: Mapping[str, bytes], wanted: Sequence[str]) -> None:
+def check_graphs(path: Path, graphs: Mapping[str, bytes], names: Sequence[str]) -> None:
     """Raise MotionloomError where a file lacks some of the graphs that its networks are run with."""
-    if not all(graphs.get(name) for name in wanted):
+    if not all(graphs.get(name) for name in names):
         raise MotionloomError(
             f"{path} has no graphs to run its networks with, as files of older versions have not; write a file that "
             f"has them by 'motionloom weights convert {path} NEW.safetensors'"
@@ -214,5 +216,5 @@ def _has_graphs(path: Path) -> bool:
     try:
         with safe_open(path, framework="np") as file:
             return any(key.startswith(GRAPH) for key in file.keys())  # noqa: SIM118
-    except (SafetensorError, OSError, *_WRONG):
+    except (SafetensorError, OSError, *_BAD):
         return False

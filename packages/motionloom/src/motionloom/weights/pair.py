@@ -26,7 +26,7 @@ _TEXTS = ("name", "base", "fingerprint", "licence", "data")
 
 @dataclass(frozen=True, eq=False)
 class PairBlock:
-    """What makes two people out of one prior."""
+    """What turns one prior into two people."""
 
     name: str
     config: PairConfig
@@ -40,7 +40,7 @@ class PairBlock:
     data: str = "unknown"
     """What it was trained on, with the acknowledgements that asks for."""
     notes: dict[str, Any] = field(default_factory=dict)
-    """How it was made: steps, seed, measured numbers."""
+    """How it was trained: steps, seed, measured numbers."""
     graph: bytes = b""
     """Of prior and block together."""
     known: Known | None = None
@@ -53,17 +53,17 @@ class PairBlock:
         Raises `MotionloomError` for a file that is missing, damaged or too large, and for another prior's block.
         """
         path = PAIRS.find(block)
-        found = read_block(path)
-        if found.fingerprint != origin(prior):
+        result = read_block(path)
+        if result.fingerprint != origin(prior):
             raise MotionloomError(
-                f"the two-person block {path.name} belongs to the weights {found.base!r}, and these are others; "
+                f"the two-person block {path.name} belongs to the weights {result.base!r}, and these are others; "
                 "use those weights, or train a block for these"
             )
-        found.config.check(prior.net.config)
-        check(found.tensors, pair_shapes(found.config, prior.net.config), str(path))
-        check_graphs(path, {"pair": found.graph}, ["pair"])
-        check_graph(found.graph, found.weights(prior), PairSession.outputs)
-        return found
+        result.config.check(prior.net.config)
+        check(result.tensors, pair_shapes(result.config, prior.net.config), str(path))
+        check_graphs(path, {"pair": result.graph}, ["pair"])
+        check_graph(result.graph, result.weights(prior), PairSession.outputs)
+        return result
 
     def save(self, path: Path | str, *, half: bool = True) -> Path:
         """Write it as a .safetensors file and give the path back; the file appears whole or not at all."""
@@ -79,7 +79,7 @@ class PairBlock:
 
     def weights(self, prior: Prior) -> dict[str, np.ndarray]:
         """All that the graph is filled with."""
-        return {**prior.net.weights, **self.tensors, "mean": prior.mean, "std": prior.std}
+        return dict(prior.net.weights, **self.tensors, mean=prior.mean, std=prior.std)
 
     def net(self, prior: Prior) -> PairSession:
         """The network of two people, on the prior's device, ready to sample."""
@@ -95,9 +95,9 @@ def read_block(path: Path) -> PairBlock:
     """What a file holds and says, without a prior to fit it to; raises MotionloomError as `PairBlock.load`."""
     about, tensors = PAIRS.read(path)
     with PAIRS.parsing(path):
-        said, notes, config = {key: about[key] for key in _TEXTS}, about.get("notes", {}), about["config"]
+        texts, notes, config = {key: about[key] for key in _TEXTS}, about.get("notes", {}), about["config"]
         if (
-            not all(isinstance(value, str) for value in said.values())
+            not all(isinstance(value, str) for value in texts.values())
             or not isinstance(notes, dict)
             or not isinstance(config, dict)
         ):
@@ -108,4 +108,4 @@ def read_block(path: Path) -> PairBlock:
             known = unpack_known(weights, about["known"], width=weights["known.vectors"].shape[-1])
             weights = {name: value for name, value in weights.items() if not name.startswith("known.")}
         config = PairConfig.parse(config)
-        return PairBlock(config=config, tensors=weights, notes=notes, graph=graph, known=known, **said)
+        return PairBlock(config=config, tensors=weights, notes=notes, graph=graph, known=known, **texts)

@@ -160,7 +160,8 @@ def load_predictor(path: Path) -> Predictor:
     """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     about, tensors = PREDICTORS.read(path)
     with PREDICTORS.parsing(path):
-        config, layout = PredictorConfig.parse(about["net"]), Layout.parse(about["layout"])
+        config = PredictorConfig.parse(about["net"])
+        layout = Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
         schedule, card = parse_schedule(about["schedule"]), Card.parse(about["card"])
         fps, observed, variant = float(about["fps"]), about["observed"], _variant(about)
@@ -195,7 +196,7 @@ def _statistics(path: Path, tensors: dict[str, Array], config: PredictorConfig) 
         if not values.size or not np.isfinite(values).all():
             raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
     shape = (config.kept, config.channels)
-    fits = mean.shape == shape and std.shape == shape and pose.shape == (2, config.channels)
+    fits = mean.shape == std.shape == shape and pose.shape == (2, config.channels)
     if not fits or std.min() <= 0 or pose[1].min() <= 0:
         raise MotionloomError(f"{path} lacks usable statistics; fetch the weights again")
     return mean, std, pose

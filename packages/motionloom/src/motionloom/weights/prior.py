@@ -23,7 +23,7 @@ from motionloom.runtime.prior_condition import Condition, condition
 from motionloom.runtime.session import find_device
 from motionloom.runtime.shapes import prior_shapes
 from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.known import Known, pack_known, unpack_known, with_sentences
+from motionloom.runtime.text.known import Known, add_sentences, pack_known, unpack_known
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.runtime.text.published import TEXTS, PublishedText
@@ -54,7 +54,7 @@ class Card:
     data: str = "unknown"
     """What they were trained on, with the acknowledgements that asks for."""
     notes: dict[str, Any] = field(default_factory=dict)
-    """How they were made: steps, seed, recipe, measured numbers."""
+    """How they were trained: steps, seed, recipe, measured numbers."""
 
     @staticmethod
     def parse(about: dict[str, Any]) -> "Card":
@@ -138,17 +138,17 @@ class Prior:
             return self
         for adapter, _ in adapters:
             adapter.check_prior(self)
-        said = [text for adapter, factor in adapters if factor > 0 for text in adapter.captions]
-        known = with_sentences(self.known, said, self.text) if self.known is not None and said else self.known
+        texts = [text for adapter, factor in adapters if factor > 0 for text in adapter.captions]
+        known = add_sentences(self.known, texts, self.text) if self.known is not None and texts else self.known
         return replace(self, net=merged(self.net, adapters), origin=origin(self), known=known)
 
     def condition(self, prompts: list[str], lengths: list[int] | None = None) -> Condition:
-        """Encode prompts, one row each; an empty prompt asks for nothing in particular."""
-        said = self.text.encode(prompts)
+        """Encode prompts, one row each; an empty prompt is for nothing in particular."""
+        text = self.text.encode(prompts)
         if self.net.modulated:
-            cond = condition(said.pooled, tokens=said.tokens, words=said.mask, lengths=lengths)
+            cond = condition(text.pooled, tokens=text.tokens, words=text.mask, lengths=lengths)
         else:
-            cond = condition(said.pooled, lengths=lengths)
+            cond = condition(text.pooled, lengths=lengths)
         keep = np.array([bool(p.strip()) for p in prompts])
         return cond if keep.all() else cond.choose(keep)
 
@@ -169,7 +169,7 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
     The embedded text encoder goes inside. Raises `MotionloomError` for another suffix or a place not to be written.
     """
     tensors = halved(prior.net.weights, half)
-    tensors |= {"mean": prior.mean.astype(np.float32), "std": prior.std.astype(np.float32)}
+    tensors |= {name: getattr(prior, name).astype(np.float32) for name in ("mean", "std")}
     graphs = dict(prior.net.graphs)
     if isinstance(prior.text, MiniLM):
         tensors |= {f"text.{k}": v for k, v in prior.text.to_tensors().items()}

@@ -13,12 +13,12 @@ from motionloom.goals.remarks import nearest_known
 from motionloom.runtime.text.known import (
     Known,
     Nearest,
+    add_sentences,
     bare,
     known_sentences,
     nearest,
     pack_known,
     unpack_known,
-    with_sentences,
 )
 from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.weights.prior import Prior
@@ -105,7 +105,7 @@ def test_one_sentence_with_the_same_noun_makes_no_prompt_known() -> None:
 
 def test_more_sentences_make_a_prompt_known() -> None:
     known = known_sentences(["walks"], {"walk": 3.0}, Letters())  # type: ignore[arg-type]
-    more = with_sentences(known, ["a zombie hobbles"], Letters())  # type: ignore[arg-type]
+    more = add_sentences(known, ["a zombie hobbles"], Letters())  # type: ignore[arg-type]
     assert not nearest(known, ["a zombie hobbles"], Letters())[0].near  # type: ignore[arg-type]
     assert nearest(more, ["a zombie hobbles"], Letters())[0].similarity == pytest.approx(1, abs=1e-6)  # type: ignore[arg-type]
     assert more.seconds == {"walk": 3.0}

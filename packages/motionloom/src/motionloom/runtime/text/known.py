@@ -21,7 +21,7 @@ from motionloom.runtime.text.quantise import dequantise, quantise
 SAME, NEAR, AROUND = 0.75, 0.45, 8
 """A prompt is near to what was learned where the cosine to one sentence is at least `SAME`, or the mean over its
 nearest `AROUND` sentences at least `NEAR`: one alone may share no more than a noun with it (figures: docs/words.md)."""
-UNHEARD = 0.08
+UNKNOWN_VERB = 0.08
 """How much nearer a prompt must be whose verb is in no sentence: "vacuuming" is no cartwheel for the room it is in."""
 MOST_SENTENCES = 1500
 MAX_SENTENCES, MAX_CHARACTERS, MAX_ACTIONS = 8192, 1000, 8192
@@ -64,19 +64,19 @@ class Nearest:
     """Cosine of the first of them."""
     around: float
     """Mean cosine of the nearest `AROUND` sentences, or of all where there are fewer."""
-    heard: bool = True
+    verb_known: bool = True
     """Whether the prompt's verb is in any of the sentences."""
 
     @property
     def near(self) -> bool:
         """Whether anything like the prompt was learned."""
-        return self.similarity >= SAME or self.around >= NEAR + (0.0 if self.heard else UNHEARD)
+        return self.similarity >= SAME or self.around >= NEAR + (0.0 if self.verb_known else UNKNOWN_VERB)
 
     def remark(self) -> str:
         """One line for somebody whose prompt is not near to anything."""
-        said = ", ".join(f"'{sentence}'" for sentence in self.sentences)
+        sentences = ", ".join(f"'{sentence}'" for sentence in self.sentences)
         prompt = _short(bare(self.prompt) or self.prompt.strip())
-        return one_line(f"these weights have seen nothing like '{prompt}'; nearest: {said}")
+        return one_line(f"these weights have seen nothing like '{prompt}'; nearest: {sentences}")
 
 
 def stem(word: str) -> str:
@@ -127,18 +127,18 @@ def nearest(
     """
     if not prompts:
         return []
-    asked = unit(encoder.encode([bare(p) for p in prompts]).pooled)
-    similar = asked @ known.vectors.T
+    vectors = unit(encoder.encode([bare(p) for p in prompts]).pooled)
+    similar = vectors @ known.vectors.T
     places = np.argsort(-similar, axis=1, kind="stable")
     similar = np.take_along_axis(similar, places, axis=1)
-    heard = [all(stem(word) in known.words for word in words) for words in verbs] or [True] * len(prompts)
+    verbs_known = [all(stem(word) in known.words for word in words) for words in verbs] or [True] * len(prompts)
     return [
         Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]), float(values[:AROUND].mean()), one)
-        for prompt, row, values, one in zip(prompts, places[:, :count].tolist(), similar, heard, strict=True)
+        for prompt, row, values, one in zip(prompts, places[:, :count].tolist(), similar, verbs_known, strict=True)
     ]
 
 
-def with_sentences(known: Known, sentences: Sequence[str], encoder: TextEncoder) -> Known:
+def add_sentences(known: Known, sentences: Sequence[str], encoder: TextEncoder) -> Known:
     """The table with some more sentences, such as those of an adapter."""
     more = known_sentences(sentences, {}, encoder)
     return Known((*known.sentences, *more.sentences), np.concatenate([known.vectors, more.vectors]), known.seconds)
@@ -167,7 +167,7 @@ def _short(text: str) -> str:
 def pack_known(known: Known) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Tensors ``known.vectors`` (int8) and ``known.scale`` (float16), and what goes into the file's description."""
     values, scale = quantise(known.vectors)
-    seconds = {action: round(float(count), 1) for action, count in known.seconds.items()}
+    seconds = {name: round(float(count), 1) for name, count in known.seconds.items()}
     return {"known.vectors": values, "known.scale": scale}, {"sentences": list(known.sentences), "seconds": seconds}
 
 
@@ -189,13 +189,13 @@ def unpack_known(tensors: Mapping[str, np.ndarray], about: Any, *, width: int) -
     return Known(tuple(sentences), vectors, seconds)
 
 
-def _durations(found: Any) -> dict[str, float]:
+def _durations(seconds: Any) -> dict[str, float]:
     """Seconds of each action, checked; raises ValueError."""
     if (
-        not isinstance(found, dict)
-        or len(found) > MAX_ACTIONS
-        or not all(isinstance(count, int | float) and 0 <= count < 1e9 for count in found.values())
-        or not all(len(action) <= MAX_CHARACTERS for action in found)
+        not isinstance(seconds, dict)
+        or len(seconds) > MAX_ACTIONS
+        or not all(isinstance(count, int | float) and 0 <= count < 1e9 for count in seconds.values())
+        or not all(len(action) <= MAX_CHARACTERS for action in seconds)
     ):
         raise ValueError("its table of known actions does not hold seconds")
-    return {str(action): float(count) for action, count in found.items()}
+    return {str(action): float(count) for action, count in seconds.items()}

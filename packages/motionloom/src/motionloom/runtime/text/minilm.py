@@ -1,6 +1,6 @@
 """The embedded default text encoder: all-MiniLM-L6-v2 in eight bits with a smaller vocabulary.
 
-How it was made and how far it is from the original: docs/decisions/0002-text-encoder.md.
+How it was built and how far it is from the original: docs/decisions/0002-text-encoder.md.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,7 +62,8 @@ class MiniLM:
         self._places = packed["places.weight"].astype(np.float32)
         self._session = Session(graph, self._weights, seldom=True)
         self._tokenizer = make_tokenizer(self.vocabulary)
-        self._start, self._end = self.vocabulary.index(START), self.vocabulary.index(END)
+        self._start = self.vocabulary.index(START)
+        self._end = self.vocabulary.index(END)
         self._cache = RowCache(cache)
 
     @property
@@ -80,7 +81,7 @@ class MiniLM:
         try:
             vocabulary = read_vocabulary(tensors[VOCABULARY])
             check_finite(tensors)
-            weights = {name: value for name, value in tensors.items() if _is_weight(name)}
+            weights = {key: value for key, value in tensors.items() if _is_weight(key)}
             sizes = sizes_of(weights)
             table, scale = tensors[WORDS], tensors[WORDS + SCALE]
             if table.shape != (len(vocabulary), sizes["width"]) or scale.shape != (len(vocabulary),):
@@ -95,7 +96,7 @@ class MiniLM:
             raise MotionloomError(
                 f"The text encoder inside the weights is damaged ({reason}); fetch the weights again."
             ) from error
-        check_graph(graph, {f"text.{name}": value for name, value in weights.items()}, ["states"])
+        check_graph(graph, {f"text.{key}": value for key, value in weights.items()}, ["states"])
         return MiniLM(vocabulary, dict(tensors), graph, cache=cache)
 
     def to_tensors(self) -> dict[str, np.ndarray]:
@@ -123,8 +124,9 @@ class MiniLM:
         rows: dict[int, Row] = {}
         for chosen in _batches([len(row) for row in ids]):
             lengths = np.array([len(ids[place]) for place in chosen])
-            padded = np.array([ids[place] + [0] * (lengths.max() - len(ids[place])) for place in chosen])
-            mask = np.arange(lengths.max()) < lengths[:, None]
+            width = lengths.max()
+            padded = np.array([ids[place] + [0] * (width - len(ids[place])) for place in chosen])
+            mask = np.arange(width) < lengths[:, None]
             [states] = self._session.run({"pieces": self._embedded(padded), "mask": mask})
             for place, row in zip(chosen, states, strict=True):
                 words = row[: len(ids[place])].copy()
@@ -159,16 +161,16 @@ def shapes(sizes: Mapping[str, int]) -> dict[str, tuple[int, ...]]:
         "hidden_in": (hidden, width),
         "hidden_out": (width, hidden),
     }
-    found: dict[str, tuple[int, ...]] = {"places.weight": (sizes["places"], width)}
+    result: dict[str, tuple[int, ...]] = {"places.weight": (sizes["places"], width)}
     norms = ["norm"]
     for layer in range(sizes["layers"]):
         norms += [f"layers.{layer}.attention_norm", f"layers.{layer}.hidden_norm"]
         for name, shape in linears.items():
-            found[f"layers.{layer}.{name}.weight"] = shape
-            found[f"layers.{layer}.{name}.bias"] = shape[:1]
+            result[f"layers.{layer}.{name}.weight"] = shape
+            result[f"layers.{layer}.{name}.bias"] = shape[:1]
     for name in norms:
-        found[f"{name}.weight"] = found[f"{name}.bias"] = (width,)
-    return found
+        result[f"{name}.weight"] = result[f"{name}.bias"] = (width,)
+    return result
 
 
 def _batches(lengths: list[int]) -> Iterator[list[int]]:

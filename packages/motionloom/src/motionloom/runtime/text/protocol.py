@@ -93,12 +93,12 @@ class RowCache:
         return len(self._rows)
 
     def fetch(self, texts: Sequence[str], encode: Callable[[list[str]], list[Row]]) -> list[Row]:
-        """The rows of all texts; `encode` is called once, with the distinct texts not seen lately."""
+        """The rows of all texts; `encode` is called once, with the distinct texts that it does not hold."""
         with self._lock:
-            found = {text: self._rows.get(text) for text in texts}
-        missing = [text for text, row in found.items() if row is None]
-        found |= dict(zip(missing, encode(missing))) if missing else {}
-        rows = [row for text in texts if (row := found[text]) is not None]
+            by_text = {text: self._rows.get(text) for text in texts}
+        missing = [text for text, row in by_text.items() if row is None]
+        by_text |= dict(zip(missing, encode(missing))) if missing else {}
+        rows = [row for text in texts if (row := by_text[text]) is not None]
         with self._lock:
             for text, row in zip(texts, rows):
                 self._rows[text] = row
