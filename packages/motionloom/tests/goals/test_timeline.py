@@ -39,6 +39,25 @@ def read(tmp_path):
     return reader
 
 
+@pytest.mark.parametrize(
+    ("text", "seconds", "lengths", "rests"),
+    [
+        ("a person squats down once and comes back up", 5.0, [2.2, 2.8], [1]),
+        ("an athlete does three squats", 7.0, [2.2, 2.2, 2.6], []),
+        ("a person jumps twice", 2.0, [1.0, 1.0], []),
+        ("a man jumps twice, then waves", 8.0, [1.5, 1.5, 1.0, 4.0], [2]),
+        ("a person does three squats", None, [2.2, 2.2, 2.2], []),
+    ],
+)
+def test_repetitions_take_the_seconds_that_were_said(
+    text: str, seconds: float | None, lengths: list[float], rests: list[int]
+) -> None:
+    """The last one takes a little longer, or the person stands behind it."""
+    timeline = timeline_of(text, seconds, amounts=True)
+    assert [segment.seconds for segment in timeline.segments] == pytest.approx(lengths)
+    assert [i for i, one in enumerate(timeline.segments) if one.text.endswith(" stands still")] == rests
+
+
 def test_every_key_arrives_where_it_belongs(read, tmp_path):
     io.save(Motion(SMPL22, 20.0, np.zeros((3, 3)), np.tile(IDENTITY, (3, 22, 1))), tmp_path / "clip.bvh")
     timeline = read(

@@ -28,6 +28,7 @@ from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.goals.sequence import Part, lengths, split_actions
+from motionloom.goals.verbs import subject_of
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
 from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
@@ -36,6 +37,8 @@ from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys, usu
 
 TIMELINE, SEGMENT = specs(TimelineKeys), specs(SegmentKeys)
 SHORTEST = SEGMENT["seconds"].low
+REST = 1.0
+"""Seconds from which on somebody stands still behind repetitions that are over before the time that was said."""
 MAX_SEGMENTS = MAX_ITEMS
 MAX_GOAL_FRAMES = 1_000_000
 """Frames with targets in one timeline, 0.6 GB of them."""
@@ -49,6 +52,8 @@ class Reading:
     first: int
     end: int
     """Half-open range of the segments that do it."""
+    fixed: bool = False
+    """Whether these take the seconds that were said, whatever one of them takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,13 +175,15 @@ def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre
     if not any(own):
         return _timeline_of_parts(text, parts, seconds)
     natural = [replace(part, seconds=length or part.seconds) for part, length in zip(parts, own, strict=True)]
+    fixed = seconds is not None
     if seconds is None and len(parts) == 1:
         seconds = min(natural[0].seconds, LONGEST)
     segments, readings = [], []
     for segment, amount in zip(_timeline_of_parts(text, natural, seconds).segments, amounts, strict=True):
         several = (segment,) if amount is None else with_amount(segment, amount)
         if amount is not None:
-            readings.append(Reading(amount, len(segments), len(segments) + len(several)))
+            several = in_seconds(several, segment.seconds) if fixed else several
+            readings.append(Reading(amount, len(segments), len(segments) + len(several), fixed))
         segments += several
     return Timeline(tuple(segments), readings=tuple(readings))
 
@@ -197,6 +204,19 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
     stroke = _in_whole_frames(min(stroke, each * share))
     between = min(TRANSITION, segment.transition, stroke / 2)
     return (replace(segment, text=text, seconds=stroke, transition=between),) * number
+
+
+def in_seconds(segments: Sequence[Segment], seconds: float) -> tuple[Segment, ...]:
+    """Segments in so many seconds: shorter ones, or the last one longer, or somebody who then stands still."""
+    left = seconds - sum(one.seconds for one in segments)
+    if left < 0:
+        each = seconds / len(segments)
+        return tuple(replace(one, seconds=each, transition=min(one.transition, each / 2)) for one in segments)
+    *before, last = segments
+    if left < REST:
+        return (*before, replace(last, seconds=last.seconds + left))
+    standing = f"{subject_of(last.text) or 'a person'} stands still"
+    return (*segments, Segment(standing, left, transition=min(TRANSITION, last.seconds / 2, left / 2)))
 
 
 def _timeline_of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:

@@ -341,6 +341,7 @@ def _scaled(timeline: Timeline, shares: Sequence[float]) -> Timeline:
         if reading.amount.kind in ("count", "steps"):
             together = replace(own[0], seconds=sum(one.seconds for one in own))
             own = goal_timeline.with_amount(together, reading.amount, min(max(share, 0.5), 2.0))
+            own = goal_timeline.in_seconds(own, together.seconds) if reading.fixed else own
         readings.append(replace(reading, first=len(segments), end=len(segments) + len(own)))
         segments += own
     return replace(timeline, segments=(*segments, *timeline.segments[at:]), readings=tuple(readings))
