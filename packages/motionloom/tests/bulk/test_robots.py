@@ -139,16 +139,19 @@ def test_the_id_changes_with_the_robot_and_its_options(robot: Robot, folder: Pat
     ],
     ids=["timeline", "goal", "words"],
 )
-def test_ways_are_in_the_robots_metres(row: dict[str, Any], robot: Robot, weights: str, folder: Path) -> None:
-    """One and a half of them, and not 0.8 times as many; without a robot they are a person's."""
+def test_ways_are_in_the_robots_metres(row: dict[str, Any], robot: Robot, folder: Path) -> None:
+    """One and a half of them, and not 0.8 times as many; without a robot they are a person's.
+
+    With the weights that ship: the body of untrained ones shakes by more than that.
+    """
     (folder / "timeline.yaml").write_text(
         "path: {path: {points: [[0, 0], [0, 1.5]]}}\nsegments: [{text: a person walks, seconds: 3}]\n"
     )
     rows = [{**row, "robot": "tin.xml", "id": "robot"}, {**row, "id": "person"}]
-    results = list(batch(write_jobs(folder / "jobs.jsonl", rows), "out", options=options(weights)))
+    results = list(batch(write_jobs(folder / "jobs.jsonl", rows), "out", options=Options(weights="default", steps=12)))
     assert [one.state for one in results] == ["made"] * 2
     poses = load_clip("out/shard-000000/robot.npz", robot).qpos
-    assert np.hypot(*(poses[-1, :2] - poses[0, :2])) == pytest.approx(1.5, abs=0.2)  # an untrained person shakes
+    assert np.hypot(*(poses[-1, :2] - poses[0, :2])) == pytest.approx(1.5, abs=0.1)
     root = io.load("out/shard-000000/person.npz").root
     assert np.hypot(*(root[-1] - root[0])[[0, 2]]) == pytest.approx(1.5, abs=0.1)
 
