@@ -1,6 +1,7 @@
 """A prior as a function: the network's own drawing, or what is exported."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from motionloom.kinematics.physics import bone_length_error
 from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.tasks.text import generate, sample_features
 from motionloom.weights.prior import Card, Prior
+from motionloom_lab.suites.commands import sampling_of
 from motionloom_lab.suites.harness import generator
 from motionloom_train.modules import prior_session
 from motionloom_train.nets.prior import NetConfig, PriorNet
@@ -65,3 +67,16 @@ def test_what_is_finished_is_what_generate_makes(prior: Prior) -> None:
     own, _ = generator(prior, steps=2)([prompt], seconds=4.0, seed=6)
     [features] = sample_features(prior, [prompt], [80], seeds=[6], steps=2)
     np.testing.assert_array_equal(own[0], humanml.decode_positions(features.astype(np.float64)))
+
+
+@pytest.mark.parametrize(
+    ("options", "finished"),
+    [
+        ({"prompts": "basic"}, True),
+        ({"prompts": "basic", "sampled": True}, False),
+        ({}, False),
+        ({"finished": True}, True),
+    ],
+)
+def test_obedience_judges_what_is_written_and_realism_what_is_sampled(options: dict[str, Any], finished: bool) -> None:
+    assert sampling_of({"weights": "default", **options})["finished"] is finished

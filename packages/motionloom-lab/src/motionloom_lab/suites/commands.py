@@ -224,8 +224,8 @@ def generator_of(asked: Asked) -> Generate:
 
 
 def _is_finished(asked: Asked) -> bool:
-    """Whether motions are judged as `generate` writes them."""
-    return bool(asked["finished"]) if "finished" in asked else not asked.get("sampled")
+    """Whether motions are judged as `generate` writes them: of obedience unless `--sampled` is given, else with `--finished`."""
+    return not asked.get("sampled") if "prompts" in asked else bool(asked.get("finished"))
 
 
 def run_of(asked: Asked) -> Run:
