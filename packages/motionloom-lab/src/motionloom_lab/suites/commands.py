@@ -224,7 +224,7 @@ def generator_of(asked: Asked) -> Generate:
 
 
 def _is_finished(asked: Asked) -> bool:
-    """Whether motions are judged as `generate` writes them: of obedience unless `--sampled` is given, else with `--finished`."""
+    """Whether motions are judged as `generate` writes them: with `--finished`, of obedience without `--sampled`."""
     return not asked.get("sampled") if "prompts" in asked else bool(asked.get("finished"))
 
 
