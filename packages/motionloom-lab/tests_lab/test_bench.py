@@ -44,12 +44,12 @@ def fake_process(arguments: Sequence[str]) -> bench.Process:
 
 
 def test_every_number_has_a_target_and_an_explanation(prior: Prior) -> None:
-    found = bench.bench(prior, bench.Sampling(steps=5), quick=True, sizes=(64,), run=fake_process)
-    names = [entry["name"] for entry in found["entries"]]
+    results = bench.bench(prior, bench.Sampling(steps=5), quick=True, sizes=(64,), run=fake_process)
+    names = [entry["name"] for entry in results["entries"]]
     assert len(names) == len(set(names)) == 10
-    assert all(e["value"] > 0 and e["target"] and e["note"] and e["unit"] for e in found["entries"])
-    assert len(bench.table(found)) == 11
-    assert json.loads(json.dumps(found)) == found
+    assert all(e["value"] > 0 and e["target"] and e["note"] and e["unit"] for e in results["entries"])
+    assert len(bench.table(results)) == 11
+    assert json.loads(json.dumps(results)) == results
 
 
 def test_commands_compare_seconds_and_megabytes_with_their_targets() -> None:
@@ -61,19 +61,19 @@ def test_commands_compare_seconds_and_megabytes_with_their_targets() -> None:
 
 def test_starts_are_medians_over_an_import_of_the_libraries_without_the_first_round() -> None:
     """Rounds of 2, 2, 4 s and generate 20, 20, 30 s after a slow one: 20 / 2; the others 0.5 / 2."""
-    asked: list[str] = []
+    calls: list[str] = []
     took = {"-c": [50.0, 2.0, 2.0, 4.0], "generate": [90.0, 20.0, 20.0, 30.0]}
 
     def run(arguments: Sequence[str]) -> bench.Process:
-        asked.append(arguments[0])
+        calls.append(arguments[0])
         times = took.get(arguments[0], [9.0, 0.5, 0.5, 1.0])
-        return bench.Process(times[asked.count(arguments[0]) - 1], 1.0, 1.0)
+        return bench.Process(times[calls.count(arguments[0]) - 1], 1.0, 1.0)
 
     entries = speed.starts("default", repeats=3, run=run)
-    assert asked == ["-c", "generate", "info", "export", "view"] * 4
+    assert calls == ["-c", "generate", "info", "export", "view"] * 4
     assert [(e.value, e.passes) for e in entries] == [(10.0, True), (0.25, True), (0.25, True), (0.25, True)]
     took["generate"] = took["info"] = took["view"] = [9.0, 40.0, 40.0, 40.0]
-    asked.clear()
+    calls.clear()
     assert [e.passes for e in speed.starts("default", repeats=3, run=run)] == [False, False, True, False]
 
 
@@ -149,18 +149,18 @@ TINY = long.Course((4.0, 8.0, 12.0), 4.0, 1, 2)
 
 
 def test_long_motion_is_measured_at_every_length_with_its_settings() -> None:
-    asked: list[Sequence[str]] = []
+    calls: list[Sequence[str]] = []
 
     def run(arguments: Sequence[str]) -> bench.Process:
-        asked.append(arguments)
-        return bench.Process(1.0, 500.0 + len(asked), 1.0)
+        calls.append(arguments)
+        return bench.Process(1.0, 500.0 + len(calls), 1.0)
 
-    found = long.long_motion(long_prior(), bench.Sampling(steps=2), TINY, run=run)
-    assert len(found.times) == 3
-    assert all(seconds > 0 for seconds in found.times)
-    assert found.peaks_mb == (501.0, 502.0, 503.0)
-    assert [arguments.index("--seconds") - 1 for arguments in asked] == [1, 2, 3]
-    assert {"prompts": 3, "steps": 2, "together": 16, "published_handshake": 20}.items() <= found.settings.items()
+    results = long.long_motion(long_prior(), bench.Sampling(steps=2), TINY, run=run)
+    assert len(results.times) == 3
+    assert all(seconds > 0 for seconds in results.times)
+    assert results.peaks_mb == (501.0, 502.0, 503.0)
+    assert [arguments.index("--seconds") - 1 for arguments in calls] == [1, 2, 3]
+    assert {"prompts": 3, "steps": 2, "together": 16, "published_handshake": 20}.items() <= results.settings.items()
 
 
 def test_the_published_takes_are_those_of_the_released_code() -> None:
@@ -173,14 +173,14 @@ def test_the_published_takes_are_those_of_the_released_code() -> None:
 
 
 def test_each_timed_step_of_the_published_recipe_calls_the_network_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    prior, seen = long_prior(), []
-    monkeypatch.setattr(type(prior.net), "__call__", lambda net, x, level, bound: seen.append(tuple(x.shape[:2])) or x)
+    prior, calls = long_prior(), []
+    monkeypatch.setattr(type(prior.net), "__call__", lambda net, x, level, bound: calls.append(tuple(x.shape[:2])) or x)
     first, second = long.published_takes(prior, bench.Sampling(), long.prompts(3), seconds=4.0, steps=5)[1]
     assert first().shape == (3, 100, 263)
-    assert seen == [(3, 100)] * 10
-    seen.clear()
+    assert calls == [(3, 100)] * 10
+    calls.clear()
     second()
-    assert seen == [(2, 140)] * 10
+    assert calls == [(2, 140)] * 10
 
 
 def measured(times: tuple[float, ...], peaks: tuple[float, ...]) -> long.Measured:
@@ -205,18 +205,18 @@ def test_sixty_prompts_are_all_different() -> None:
 
 def test_bench_does_what_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "QUICK", TINY)
-    found = bench.bench(long_prior(), bench.Sampling(steps=2), what="long", quick=True, run=fake_process)
-    assert len(found["entries"]) == 3
-    assert len(bench.table(found)) == 4
-    assert found["long"]["settings"]["prompts"] == 3
-    assert json.loads(json.dumps(found))["long"]["times"] == list(found["long"]["times"])
+    results = bench.bench(long_prior(), bench.Sampling(steps=2), what="long", quick=True, run=fake_process)
+    assert len(results["entries"]) == 3
+    assert len(bench.table(results)) == 4
+    assert results["long"]["settings"]["prompts"] == 3
+    assert json.loads(json.dumps(results))["long"]["times"] == list(results["long"]["times"])
 
 
 def test_futures_are_measured_beside_the_published_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
 
     def recorded(predictor, past, *, count, steps):
-        asked.append((sum(values.size for values in predictor.net.weights.values()), steps))
+        calls.append((sum(values.size for values in predictor.net.weights.values()), steps))
         return past
 
     monkeypatch.setattr(prediction, "published_futures", recorded)
@@ -226,7 +226,7 @@ def test_futures_are_measured_beside_the_published_recipe(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(prediction, "timed", clock)
     entries = prediction.cost_of_futures(small_predictor(), repeats=1, timed_steps=4)
-    assert asked[1] == (28_401_712, 4)
+    assert calls[1] == (28_401_712, 4)
     assert [entry.value for entry in entries] == pytest.approx([1.0, 75.0, 50.0])  # 1, 2 and 3 s for 4 of 100 steps
     assert [entry.passes for entry in entries] == [True, True, True]
     assert "reckoned" in entries[0].note

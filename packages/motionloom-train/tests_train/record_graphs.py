@@ -12,14 +12,14 @@ from tests.recorded.graphs import BLOCKS, FILE, PREDICTORS, PRIORS, TEXT, label
 
 def record() -> dict[str, bytes]:
     """The graph of each network, by its name in the file."""
-    made = {label("text"): text_graph(**TEXT)}
+    graphs = {label("text"): text_graph(**TEXT)}
     for config in PRIORS.values():
-        made |= {label(name, config): graph for name, graph in prior_graphs(config).items()}
+        graphs |= {label(name, config): graph for name, graph in prior_graphs(config).items()}
     for block, prior in BLOCKS.values():
-        made[label("pair", block, prior)] = pair_graph(block, prior)
+        graphs[label("pair", block, prior)] = pair_graph(block, prior)
     for config in PREDICTORS.values():
-        made[label("predictor", config)] = predictor_graph(config)
-    return made
+        graphs[label("predictor", config)] = predictor_graph(config)
+    return graphs
 
 
 def main() -> None:

@@ -71,14 +71,14 @@ def losses(data: Path, out: Path, plan: Recipe, *, say=print) -> list[float]:
     batches = Batches(motions, windows=plan.windows, shares=plan.shares)
     words = WordBank(tiny.text(), motions.texts, progress=lambda line: None)
     objective = CleanError(net, SCHEDULES[plan.schedule](plan.levels), batches, words)
-    seen: list[float] = []
+    values: list[float] = []
 
     def on_step(step: int, loss: float, seconds: float) -> None:
-        seen.append(loss)
+        values.append(loss)
         say(f"{step} {loss!r}", flush=True)
 
     train(objective, plan, out, world=world, wrap=Conditioned, on_step=on_step)
-    return seen
+    return values
 
 
 if __name__ == "__main__":

@@ -52,10 +52,10 @@ def test_masks_give_what_the_control_says_and_nothing_else(control):
     lengths = np.full(400, 60)
     masks = draw_masks(control, lengths, 60, rng=np.random.default_rng(1))
     ever = masks.any(axis=(0, 1))
-    wanted = mask("root_horizontal") if control == "trajectory" else np.ones(263, bool)
+    target = mask("root_horizontal") if control == "trajectory" else np.ones(263, bool)
     if control not in ("any", "trajectory"):
-        wanted = mask(control) | (np.arange(263) < 4)
-    np.testing.assert_array_equal(ever, wanted)
+        target = mask(control) | (np.arange(263) < 4)
+    np.testing.assert_array_equal(ever, target)
     empty = float((~masks.any(axis=(1, 2))).mean())
     assert NOTHING / 3 < empty < NOTHING * 3
     frames = masks.any(axis=2).mean(axis=1)
@@ -90,19 +90,19 @@ def test_chosen_frames_lie_within_the_motion():
 
 def test_given_numbers_of_a_training_state_have_no_noise(data):
     """Algorithm 1: signal * x_0 where given, noise everywhere else; the network is told both."""
-    motions, schedule, seen = load_set(data), cosine(50), []
+    motions, schedule, calls = load_set(data), cosine(50), []
     batches = Batches(motions, windows=[32], shares=[1.0])
     words = WordBank(tiny.text(), motions.texts, progress=lambda line: None)
 
     class Spy(torch.nn.Module):
-        def forward(self, x, level, cond, given, mask):
-            seen.append((x, level, given, mask))
+        def forward(self, x, level, cond, known, mask):
+            calls.append((x, level, known, mask))
             return x
 
     objective = ControlledError(Spy(), schedule, batches, words, Recipe(control="left_wrist"))
     first, again, later = (objective.loss(objective.net, 0, step, 16) for step in (1, 1, 2))
     assert first == again != later
-    x, level, clean, flags = seen[0]
+    x, level, clean, flags = calls[0]
     signal = tensor(schedule.signal)[level].float()[:, None, None].expand_as(x)
     torch.testing.assert_close(x[flags], (signal * clean)[flags])
     assert float(((x - signal * clean)[~flags] != 0).float().mean()) > 0.999
@@ -113,11 +113,11 @@ def test_given_numbers_of_a_training_state_have_no_noise(data):
 def test_a_run_makes_an_adapter_of_its_prior_and_leaves_the_prior_alone(data, start, tmp_path):
     place, lines = trained(data, tmp_path, start)
     prior = Prior.load(start)
-    found = Adapter.load(place, prior)
-    assert (found.name, found.control, found.rank, found.given_rank) == ("wrist", "left_wrist", 2, 4)
-    assert found.licence == "free"
-    assert found.notes["steps"] == 8
-    assert np.abs(found.tensors["out.up"]).max() > 0
+    adapter = Adapter.load(place, prior)
+    assert (adapter.name, adapter.control, adapter.rank, adapter.given_rank) == ("wrist", "left_wrist", 2, 4)
+    assert adapter.licence == "free"
+    assert adapter.notes["steps"] == 8
+    assert np.abs(adapter.tensors["out.up"]).max() > 0
     assert set(read_tensors(tmp_path / "state.safetensors")[0]).isdisjoint({"net.embed.weight", "net.net.embed.weight"})
     assert re.search(r"[\d,]+ trained parameters", lines[1])
 
@@ -177,10 +177,10 @@ def test_an_adapter_goes_on_from_another(data, start, tmp_path):
 
 def test_a_full_fine_tune_is_a_prior_with_other_weights(data, start, tmp_path):
     place, _ = trained(data, tmp_path, start, full=True, steps=2, rate=1e-3)
-    made, base = Prior.load(place), Prior.load(start)
-    assert made.card.notes["control"] == "left_wrist"
-    assert np.array_equal(made.mean, base.mean)
-    changed = [k for k, v in made.net.weights.items() if not np.array_equal(v, base.net.weights[k])]
+    tuned, base = Prior.load(place), Prior.load(start)
+    assert tuned.card.notes["control"] == "left_wrist"
+    assert np.array_equal(tuned.mean, base.mean)
+    changed = [k for k, v in tuned.net.weights.items() if not np.array_equal(v, base.net.weights[k])]
     assert len(changed) > 0.9 * len(base.net.weights)
 
 
@@ -196,12 +196,12 @@ def test_held_out_errors_are_reported_beside_the_base_networks(data, start, tmp_
     clip = read_clip(next((data / "clips").iterdir()))
     write_clip(tmp_path / "set" / "clips", replace(clip, name="held", split="val"))
     _, lines = trained(tmp_path / "set", tmp_path / "run", start, steps=1, rate=1e-12)
-    told = re.search(
+    match = re.search(
         r"given numbers (\S+) \(base network (\S+)\), free numbers (\S+) \(base network (\S+)\)", lines[-1]
     )
-    assert told
-    given, given0, free, free0 = map(float, told.groups())
-    assert given == pytest.approx(given0, abs=1e-3)
+    assert match
+    known, given0, free, free0 = map(float, match.groups())
+    assert known == pytest.approx(given0, abs=1e-3)
     assert free == pytest.approx(free0, abs=1e-3)
 
 

@@ -50,11 +50,11 @@ def condition_of(cond: prior_condition.Condition) -> Condition:
     return Condition(*map(tensor, cond))
 
 
-def assert_near(found: np.ndarray, wanted: Tensor, lengths: list[int]) -> None:
+def assert_near(answer: np.ndarray, target: Tensor, lengths: list[int]) -> None:
     """Equal in what is no padding."""
     for row, length in enumerate(lengths):
-        part = slice(length if length > 0 else found.shape[1])
-        np.testing.assert_allclose(found[row, part], wanted.numpy()[row, part], rtol=0, atol=NEAR)
+        part = slice(length if length > 0 else answer.shape[1])
+        np.testing.assert_allclose(answer[row, part], target.numpy()[row, part], rtol=0, atol=NEAR)
 
 
 def filled(net: nn.Module) -> nn.Module:
@@ -73,10 +73,10 @@ def test_a_shipped_prior(name: str) -> None:
     prior = Prior.load(name)
     module, cond = prior_module(prior), prior.condition(PROMPTS, LENGTHS)
     x, levels = noise(4, FRAMES, prior.net.config.features), np.array([1, 300, 700, prior.schedule.steps])
-    bound, wanted = prior.net.bind(cond), module.bind(condition_of(cond))
-    for found, part in zip(bound[:3], wanted[:3], strict=True):
-        np.testing.assert_allclose(found, part.numpy(), rtol=0, atol=NEAR)
-    assert_near(prior.net(x, levels, bound), module(tensor(x), tensor(levels), wanted), LENGTHS)
+    bound, target = prior.net.bind(cond), module.bind(condition_of(cond))
+    for answer, part in zip(bound[:3], target[:3], strict=True):
+        np.testing.assert_allclose(answer, part.numpy(), rtol=0, atol=NEAR)
+    assert_near(prior.net(x, levels, bound), module(tensor(x), tensor(levels), target), LENGTHS)
 
 
 @pytest.mark.parametrize("name", adapters())
@@ -87,12 +87,12 @@ def test_a_shipped_adapter(name: str) -> None:
     adapter = Adapter.load(name, prior)
     net, module = adapted(prior.net, adapter), adapted_module(prior_module(prior), adapter)
     cond = prior.condition(PROMPTS, LENGTHS)
-    bound, wanted = net.bind(cond), module.bind(condition_of(cond))
-    x, given = noise(4, FRAMES, 263), noise(4, FRAMES, 263, seed=1)
+    bound, target = net.bind(cond), module.bind(condition_of(cond))
+    x, known = noise(4, FRAMES, 263), noise(4, FRAMES, 263, seed=1)
     mask = noise(4, FRAMES, 263, seed=2) > 1
-    seen = module(tensor(x), 400, Controlled(wanted, tensor(given), tensor(mask)))
-    assert_near(net(x, 400, net.show(bound, given, mask)), seen, LENGTHS)
-    assert_near(net(x, 400, bound), module(tensor(x), 400, wanted), LENGTHS)
+    answer = module(tensor(x), 400, Controlled(target, tensor(known), tensor(mask)))
+    assert_near(net(x, 400, net.show(bound, known, mask)), answer, LENGTHS)
+    assert_near(net(x, 400, bound), module(tensor(x), 400, target), LENGTHS)
 
 
 @pytest.mark.parametrize("name", blocks())
@@ -104,9 +104,9 @@ def test_a_shipped_block(name: str) -> None:
     lengths = [FRAMES, FRAMES, 30, 30]
     cond = prior.condition(["two people dance"] * 4, lengths)
     x, levels = noise(4, 1 + FRAMES, 263), np.array([20, 20, 900, 900])
-    found = net(x, levels, net.bind(cond))
-    wanted = module(tensor(x), tensor(levels), module.bind(condition_of(cond)))
-    assert_near(found, wanted, [1 + length for length in lengths])
+    answer = net(x, levels, net.bind(cond))
+    target = module(tensor(x), tensor(levels), module.bind(condition_of(cond)))
+    assert_near(answer, target, [1 + length for length in lengths])
 
 
 @pytest.mark.parametrize("name", shipped_predictors())
@@ -121,20 +121,20 @@ def assert_equal_predictors(net: object, module: TransLinear, config: PredictorC
     x, condition = noise(3, config.kept, config.channels), noise(3, *config.condition_shape)
     levels, keep = np.array([0, 400, 999]), np.array([True, False, True])
     for asked, kept in ((condition, None), (condition, keep), (None, None)):
-        found = net(x, levels, asked, kept)  # type: ignore[operator]
+        answer = net(x, levels, asked, kept)  # type: ignore[operator]
         said = None if asked is None else tensor(asked), None if kept is None else tensor(kept)
-        np.testing.assert_allclose(found, module(tensor(x), tensor(levels), *said).numpy(), rtol=0, atol=NEAR)
+        np.testing.assert_allclose(answer, module(tensor(x), tensor(levels), *said).numpy(), rtol=0, atol=NEAR)
 
 
 @torch.inference_mode()
 def test_the_shipped_text_encoder() -> None:
     prior = Prior.load()
     module = text_module(prior.text)  # type: ignore[arg-type]
-    found = prior.text.encode(PROMPTS)
+    answer = prior.text.encode(PROMPTS)
     for row, prompt in enumerate(PROMPTS):
         ids = prior.text.ids(prompt)  # type: ignore[attr-defined]
-        wanted = module(torch.tensor([ids]), torch.ones(1, len(ids), dtype=torch.bool))[0]
-        np.testing.assert_allclose(found.tokens[row, : len(ids)], wanted.numpy(), rtol=0, atol=NEAR)
+        target = module(torch.tensor([ids]), torch.ones(1, len(ids), dtype=torch.bool))[0]
+        np.testing.assert_allclose(answer.tokens[row, : len(ids)], target.numpy(), rtol=0, atol=NEAR)
 
 
 SMALL = NetConfig(features=11, width=32, layers=2, heads=4, hidden=48, text=24)
@@ -157,8 +157,8 @@ def test_small_priors_of_every_kind(config: NetConfig) -> None:
     flags = np.random.default_rng(0).integers(0, 2, (4, FRAMES)) if config.flags else None
     cond = prior_condition.condition(noise(4, 24), tokens=noise(4, 6, 24), words=words, lengths=LENGTHS, flags=flags)
     x, levels = noise(4, FRAMES, 11), np.array([1, 9, 300, 1000])
-    wanted = module(tensor(x), tensor(levels), module.bind(condition_of(cond)))
-    assert_near(net(x, levels, net.bind(cond)), wanted, LENGTHS)
+    target = module(tensor(x), tensor(levels), module.bind(condition_of(cond)))
+    assert_near(net(x, levels, net.bind(cond)), target, LENGTHS)
 
 
 MUTUAL = PairConfig(split=1, width=32, heads=2, hidden=48)
@@ -182,9 +182,9 @@ def test_small_blocks_of_every_kind(config: NetConfig, block: PairConfig) -> Non
     lengths = [FRAMES, FRAMES, 22, 22]
     cond = prior_condition.condition(noise(4, 24), tokens=noise(4, 6, 24), lengths=lengths)
     x, levels = noise(4, 1 + FRAMES, 263), np.array([3, 3, 40, 40])
-    found = session(x, levels, session.bind(cond))
-    wanted = net(tensor(x), tensor(levels), net.bind(condition_of(cond)))
-    assert_near(found, wanted, [1 + length for length in lengths])
+    answer = session(x, levels, session.bind(cond))
+    target = net(tensor(x), tensor(levels), net.bind(condition_of(cond)))
+    assert_near(answer, target, [1 + length for length in lengths])
 
 
 PREDICTORS = {

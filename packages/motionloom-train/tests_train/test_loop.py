@@ -52,12 +52,12 @@ def start(data: Path, out: Path, steps: int, *, processes: int = 1) -> subproces
 
 def read(running: subprocess.Popen, count: int) -> dict[int, str]:
     """At most so many `step loss` lines."""
-    found: dict[int, str] = {}
-    while len(found) < count and (line := running.stdout.readline()):
+    values: dict[int, str] = {}
+    while len(values) < count and (line := running.stdout.readline()):
         if line[:1].isdigit():
             step, loss = line.split()
-            found[int(step)] = loss
-    return found
+            values[int(step)] = loss
+    return values
 
 
 def test_the_loss_falls(whole: list[float]) -> None:

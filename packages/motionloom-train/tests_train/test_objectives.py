@@ -40,8 +40,8 @@ def test_a_joint_that_is_always_off_by_the_same_amount_goes_the_right_way() -> N
 def test_one_jump_of_a_head_is_paid_in_two_displacements() -> None:
     x = walk()
     jump = displacement_error(moved(x, ric(15), 0.2, slice(10, 11)), x, lengths(x), MEAN, STD)
-    wanted = 2 * (3 * 0.2**2) / (3 * 0.5**2) / 22 / (x.shape[1] - 1)
-    np.testing.assert_allclose(jump, wanted, rtol=1e-3)
+    target = 2 * (3 * 0.2**2) / (3 * 0.5**2) / 22 / (x.shape[1] - 1)
+    np.testing.assert_allclose(jump, target, rtol=1e-3)
 
 
 def test_planted_feet_cost_more() -> None:
@@ -63,9 +63,9 @@ def test_heights_count_more_and_nothing_else_does() -> None:
     """The root's height and every joint's second number, relative to the rest; the mean stays 1."""
     plain, raised = feature_scale(), feature_scale(3.0)
     ratio = (raised / plain) / (raised / plain)[LAYOUT["rot6d"]][0]
-    wanted = torch.ones(263)
-    wanted[LAYOUT["root_height"]] = 3.0
+    target = torch.ones(263)
+    target[LAYOUT["root_height"]] = 3.0
     for joint in range(1, 22):
-        wanted[ric(joint).start + 1] = 3.0
-    torch.testing.assert_close(ratio, wanted)
+        target[ric(joint).start + 1] = 3.0
+    torch.testing.assert_close(ratio, target)
     torch.testing.assert_close(raised.mean(), torch.tensor(1.0))

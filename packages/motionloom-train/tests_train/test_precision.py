@@ -20,8 +20,8 @@ from tests_train import runs
 
 def times(monkeypatch: pytest.MonkeyPatch, *, half: float, full: float) -> None:
     """Let a product take so many seconds in bfloat16 and in float32."""
-    taken = {True: half, False: full}
-    monkeypatch.setattr(precision, "product_seconds", lambda inner, outer, *, half: taken[half])
+    seconds = {True: half, False: full}
+    monkeypatch.setattr(precision, "product_seconds", lambda inner, outer, *, half: seconds[half])
 
 
 class Product:
@@ -39,9 +39,9 @@ class Product:
 
 def run(folder: Path, *, amp: str, steps: int) -> tuple[set[torch.dtype], list[str]]:
     """The types that products had in a run, and what it said."""
-    objective, said = Product(), []
-    loop.train(objective, runs.recipe(steps=steps, amp=amp), folder, say=said.append)
-    return set(objective.types), said
+    objective, lines = Product(), []
+    loop.train(objective, runs.recipe(steps=steps, amp=amp), folder, say=lines.append)
+    return set(objective.types), lines
 
 
 def saved(folder: Path) -> str:
@@ -70,14 +70,14 @@ def test_a_run_takes_it_says_so_and_goes_on_with_it(
 ) -> None:
     """Resumed where the other one would be quicker, it goes on as it began."""
     times(monkeypatch, half=half, full=3.0)
-    types, said = run(tmp_path, amp="auto", steps=3)
+    types, lines = run(tmp_path, amp="auto", steps=3)
     assert types == {kind}
-    assert "ms in bfloat16" in said[0]
+    assert "ms in bfloat16" in lines[0]
     assert saved(tmp_path) == name
     times(monkeypatch, half=4.0 - half, full=1.0)
-    types, said = run(tmp_path, amp="auto", steps=6)
+    types, lines = run(tmp_path, amp="auto", steps=6)
     assert types == {kind}
-    assert not any("multiplying" in line for line in said)
+    assert not any("multiplying" in line for line in lines)
     assert saved(tmp_path) == name
     assert not [line for line in loop.changed(tmp_path, runs.recipe(steps=6, amp="auto")) if "amp" in line]
 
@@ -109,12 +109,12 @@ def test_the_sizes_are_those_of_the_largest_layer() -> None:
 
 def test_measuring_ends_at_once_where_products_are_slow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both kinds of products are made, and one that takes long only once."""
-    made: list[bool] = []
+    calls: list[bool] = []
     now = iter(float(number) for number in range(100))
     monkeypatch.setattr(precision.time, "perf_counter", lambda: next(now))
-    monkeypatch.setattr(precision, "_there_and_back", lambda weights, rows, half: made.append(half))
+    monkeypatch.setattr(precision, "_there_and_back", lambda weights, rows, half: calls.append(half))
     assert product_seconds(4, 4, half=True) == 1.0
-    assert made == [True]
+    assert calls == [True]
 
 
 @pytest.mark.parametrize("half", [True, False])
@@ -127,19 +127,19 @@ def test_a_product_is_made_in_what_is_measured(half: bool) -> None:
 
 def test_how_long_it_will_take_is_said_once_after_the_first_steps() -> None:
     """The first step, in which much is set up, does not count."""
-    said: list[str] = []
-    pace = loop.Pace(100, 1400, said.append)
+    lines: list[str] = []
+    pace = loop.Pace(100, 1400, lines.append)
     for seconds in [9.0, *[0.5] * 40]:
         pace(seconds)
-    assert said == ["1,290 more steps of about 0.5 s: about 11 minutes"]
+    assert lines == ["1,290 more steps of about 0.5 s: about 11 minutes"]
 
 
 def test_slow_steps_are_not_waited_for() -> None:
-    said: list[str] = []
-    pace = loop.Pace(0, 1300, said.append)
+    lines: list[str] = []
+    pace = loop.Pace(0, 1300, lines.append)
     for _ in range(20):
         pace(6.0)
-    assert said == ["1,296 more steps of about 6 s: about 2 h 10 min"]
+    assert lines == ["1,296 more steps of about 6 s: about 2 h 10 min"]
 
 
 def test_teaching_refuses_another_kind() -> None:

@@ -24,17 +24,17 @@ def test_the_recipes_of_the_project_are_usable(path: Path) -> None:
 
 
 def test_what_is_not_written_has_its_default(tmp_path: Path) -> None:
-    made = load(tmp_path, 'name = "mine"\nsteps = 5\nrate = 1\n[net]\nwidth = 64\n')
-    assert (made.name, made.steps, made.rate, made.batch) == ("mine", 5, 1.0, Recipe().batch)
-    assert isinstance(made.rate, float)
-    assert made.net == {"width": 64}
+    recipe = load(tmp_path, 'name = "mine"\nsteps = 5\nrate = 1\n[net]\nwidth = 64\n')
+    assert (recipe.name, recipe.steps, recipe.rate, recipe.batch) == ("mine", 5, 1.0, Recipe().batch)
+    assert isinstance(recipe.rate, float)
+    assert recipe.net == {"width": 64}
 
 
 def test_changes_replace_entries_and_leave_the_rest_of_a_table_alone(tmp_path: Path) -> None:
     pairs = ["steps=7", "start=default", "net.width=32", "net.heads=2", "windows=[8, 9]"]
-    made = load(tmp_path, "steps = 5\nshares=[0.5, 0.5]\n[net]\nwidth = 64\nlayers = 3\n", **changes(pairs))
-    assert (made.steps, made.start, made.windows) == (7, "default", [8, 9])
-    assert made.net == {"width": 32, "heads": 2, "layers": 3}
+    recipe = load(tmp_path, "steps = 5\nshares=[0.5, 0.5]\n[net]\nwidth = 64\nlayers = 3\n", **changes(pairs))
+    assert (recipe.steps, recipe.start, recipe.windows) == (7, "default", [8, 9])
+    assert recipe.net == {"width": 32, "heads": 2, "layers": 3}
     with pytest.raises(MotionloomError, match="KEY=VALUE"):
         changes(["steps"])
 

@@ -35,12 +35,12 @@ def tensors(cond: prior_condition.Condition) -> Condition:
     return Condition(*map(torch.from_numpy, cond))
 
 
-def assert_near(found: np.ndarray, wanted: torch.Tensor, lengths: np.ndarray) -> None:
+def assert_near(answer: np.ndarray, target: torch.Tensor, lengths: np.ndarray) -> None:
     """Equal in what is no padding, and something."""
-    assert np.abs(found).max() > 0.1
+    assert np.abs(answer).max() > 0.1
     for row, length in enumerate(lengths):
-        part = slice(length if length > 0 else found.shape[1])
-        np.testing.assert_allclose(found[row, part], wanted.numpy()[row, part], rtol=0, atol=NEAR)
+        part = slice(length if length > 0 else answer.shape[1])
+        np.testing.assert_allclose(answer[row, part], target.numpy()[row, part], rtol=0, atol=NEAR)
 
 
 def test_recording_again_gives_the_same_graphs() -> None:
@@ -56,20 +56,20 @@ def test_priors(name: str) -> None:
     prior = tiny.prior(config)
     module, cond = prior_module(prior), condition(config.text, 4)
     x, levels = noise(4, FRAMES, config.features), np.array([1, 9, 20, 50])
-    wanted = module(torch.from_numpy(x), torch.from_numpy(levels), module.bind(tensors(cond)))
-    assert_near(prior.net(x, levels, prior.net.bind(cond)), wanted, cond.lengths)
+    target = module(torch.from_numpy(x), torch.from_numpy(levels), module.bind(tensors(cond)))
+    assert_near(prior.net(x, levels, prior.net.bind(cond)), target, cond.lengths)
 
 
 @pytest.mark.parametrize("name", BLOCKS)
 @torch.inference_mode()
 def test_blocks_of_two_people(name: str) -> None:
     prior = tiny.prior(BLOCKS[name][1])
-    made = block(prior)
-    net, module, cond = made.net(prior), pair_module(made, prior), condition(prior.net.config.text, 4)
+    talk = block(prior)
+    net, module, cond = talk.net(prior), pair_module(talk, prior), condition(prior.net.config.text, 4)
     x = noise(4, 1 + FRAMES, 263)
     cond = cond._replace(lengths=np.full(4, -1))
-    wanted = module(torch.from_numpy(x), 9, module.bind(tensors(cond)))
-    assert_near(net(x, 9, net.bind(cond)), wanted, cond.lengths)
+    target = module(torch.from_numpy(x), 9, module.bind(tensors(cond)))
+    assert_near(net(x, 9, net.bind(cond)), target, cond.lengths)
 
 
 @pytest.mark.parametrize("name", PREDICTORS)
@@ -78,18 +78,18 @@ def test_predictors(name: str) -> None:
     config = PREDICTORS[name]
     net = network(config, 3)
     module = predictor_module(SimpleNamespace(net=net))
-    x, seen = noise(3, config.kept, config.channels), noise(3, *config.condition_shape, seed=1)
+    x, condition = noise(3, config.kept, config.channels), noise(3, *config.condition_shape, seed=1)
     levels, keep = np.array([0, 9, 999]), np.array([True, False, True])
-    wanted = module(*map(torch.from_numpy, (x, levels, seen)), torch.from_numpy(keep.astype(np.float32)))
-    assert_near(net(x, levels, seen, keep), wanted, np.full(3, -1))
+    target = module(*map(torch.from_numpy, (x, levels, condition)), torch.from_numpy(keep.astype(np.float32)))
+    assert_near(net(x, levels, condition, keep), target, np.full(3, -1))
 
 
 @torch.inference_mode()
 def test_the_text_encoder() -> None:
     text = tiny.text()
     module, ids = text_module(text), torch.tensor([text.ids("a person turns left")])
-    wanted = module(ids, torch.ones(ids.shape, dtype=torch.bool))
-    assert_near(text.encode("a person turns left").tokens, wanted, np.array([-1]))
+    target = module(ids, torch.ones(ids.shape, dtype=torch.bool))
+    assert_near(text.encode("a person turns left").tokens, target, np.array([-1]))
 
 
 def test_a_fresh_block_has_the_zeros_of_a_fresh_module() -> None:

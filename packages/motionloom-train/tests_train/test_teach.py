@@ -34,8 +34,8 @@ def prior() -> Prior:
     """Random weights around a walking person, that say what they know."""
     features = humanml.motion_to_features(person(2.0))
     std = np.full(263, 0.02, np.float32)
-    made = replace(tiny.prior(), mean=features.mean(0), std=std)
-    return replace(made, known=known_sentences(KNOWN, {"walk": 9.0}, made.text))
+    result = replace(tiny.prior(), mean=features.mean(0), std=std)
+    return replace(result, known=known_sentences(KNOWN, {"walk": 9.0}, result.text))
 
 
 @pytest.fixture(autouse=True)
@@ -62,8 +62,8 @@ def test_the_same_seed_teaches_the_same(prior: Prior, examples: list[Example]) -
 
 
 def test_the_card_says_what_was_taught(prior: Prior, examples: list[Example], tmp_path: Path) -> None:
-    made = taught(prior, examples, licence="mine")
-    again = Adapter.load(made.save(tmp_path / "zombie.safetensors"), prior)
+    result = taught(prior, examples, licence="mine")
+    again = Adapter.load(result.save(tmp_path / "zombie.safetensors"), prior)
     assert again.taught
     assert again.captions == ("a person walks to the left", "a person walks to the right")
     assert (again.name, again.licence, again.base, again.rank) == ("zombie", "mine", "tiny", 2)
@@ -101,54 +101,54 @@ def change(prior: Prior, adapter: Adapter, prompts: list[str]) -> float:
 
 
 def test_what_was_known_changes_less_where_it_is_kept(prior: Prior, examples: list[Example]) -> None:
-    kept, free = (taught(prior, examples, steps=60, batch=8, rate=1e-2, keep=keep) for keep in (0.8, 0.0))
-    asked = [text for text in KNOWN if "left" not in text]
-    assert change(prior, kept, asked) < 0.5 * change(prior, free, asked)
+    bound, free = (taught(prior, examples, steps=60, batch=8, rate=1e-2, keep=keep) for keep in (0.8, 0.0))
+    prompts = [text for text in KNOWN if "left" not in text]
+    assert change(prior, bound, prompts) < 0.5 * change(prior, free, prompts)
 
 
 def teaching(prior: Prior, examples: list[Example], keep: float = 0.5) -> Teaching:
-    drawn = [("a person stands", np.tile(prior.mean, (100, 1)))] * 4
-    return Teaching(AdapterNet(prior_module(prior), 2, given_rank=0, taught=True), prior, examples, drawn, keep=keep)
+    motions = [("a person stands", np.tile(prior.mean, (100, 1)))] * 4
+    return Teaching(AdapterNet(prior_module(prior), 2, given_rank=0, taught=True), prior, examples, motions, keep=keep)
 
 
 def test_an_adapter_that_changes_nothing_costs_what_the_clips_cost(prior: Prior, examples: list[Example]) -> None:
     """Before the first step the kept rows agree with the prior, so their part of the loss is nothing."""
-    seen = teaching(prior, examples)
-    clean, texts, lengths = seen._rows(np.random.default_rng(1), 60, 6, 3)
+    objective = teaching(prior, examples)
+    clean, texts, lengths = objective._rows(np.random.default_rng(1), 60, 6, 3)
     assert len(texts) == len(lengths) == len(clean) == 6
     same = torch.randn(6, 60, 263)
-    whole = seen._error(same, clean, same[3:], torch.tensor(lengths), 3)
-    own = seen._error(same[:3], clean[:3], same[:0], torch.tensor(lengths[:3]), 3)
+    whole = objective._error(same, clean, same[3:], torch.tensor(lengths), 3)
+    own = objective._error(same[:3], clean[:3], same[:0], torch.tensor(lengths[:3]), 3)
     assert float(whole) == pytest.approx(float(own))
 
 
 def test_a_step_depends_on_its_number_alone(prior: Prior, examples: list[Example]) -> None:
-    seen = teaching(prior, examples)
-    net = Conditioned(seen.net)
-    first, again, other = (float(seen.loss(net, 3, step, 4).detach()) for step in (7, 7, 8))
+    objective = teaching(prior, examples)
+    net = Conditioned(objective.net)
+    first, again, other = (float(objective.loss(net, 3, step, 4).detach()) for step in (7, 7, 8))
     assert first == again != other
 
 
 def test_near_pure_noise_other_known_sentences_are_kept(prior: Prior, examples: list[Example]) -> None:
     """They take the place of those of the drawn motions, never that of what is taught."""
-    drawn = [("a person stands", np.tile(prior.mean, (100, 1)))] * 4
+    motions = [("a person stands", np.tile(prior.mean, (100, 1)))] * 4
     net = AdapterNet(prior_module(prior), 2, given_rank=0, taught=True)
-    seen = Teaching(net, prior, examples, drawn, ["a person climbs", "a person crawls"], keep=0.5)
-    asked = []
-    plain = seen.words.condition
+    objective = Teaching(net, prior, examples, motions, ["a person climbs", "a person crawls"], keep=0.5)
+    calls = []
+    plain = objective.words.condition
 
     def remembered(texts: torch.Tensor, lengths: torch.Tensor) -> Condition:
-        asked.append(texts.tolist())
+        calls.append(texts.tolist())
         return plain(texts, lengths)
 
-    seen.words.condition = remembered
+    objective.words.condition = remembered
     for step in range(12):
-        seen.loss(Conditioned(net), 3, step, 8)
-    others = set(seen.others)
-    assert not others & {number for row in asked for number in row[:4]}
-    kept = [number for row in asked for number in row[4:]]
-    assert others < set(kept)
-    assert 0.1 < np.mean([number in others for number in kept]) < 0.6
+        objective.loss(Conditioned(net), 3, step, 8)
+    others = set(objective.others)
+    assert not others & {number for row in calls for number in row[:4]}
+    numbers = [number for row in calls for number in row[4:]]
+    assert others < set(numbers)
+    assert 0.1 < np.mean([number in others for number in numbers]) < 0.6
 
 
 @pytest.mark.parametrize("window", [60, 160])

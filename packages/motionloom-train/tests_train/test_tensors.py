@@ -22,8 +22,8 @@ def test_ground_poses() -> None:
         (ground.normalized, (base,)),
         (ground.mirrored, (base,)),
     ):
-        found = function(*map(torch.from_numpy, args))
-        assert found.numpy() == pytest.approx(function(*args))
+        result = function(*map(torch.from_numpy, args))
+        assert result.numpy() == pytest.approx(function(*args))
 
 
 @pytest.mark.parametrize("fade", [blending.smoothstep, blending.smootherstep])
@@ -32,14 +32,14 @@ def test_fades(fade) -> None:
 
 
 def test_two_people() -> None:
-    made = pair.encode(people(13))
-    features, stands = made.features.astype(np.float64), made.poses
-    there = pair.decode(torch.from_numpy(features), torch.from_numpy(stands))
-    np.testing.assert_allclose(there.numpy(), pair.decode(features, stands), atol=1e-12)
+    motion = pair.encode(people(13))
+    features, poses = motion.features.astype(np.float64), motion.poses
+    there = pair.decode(torch.from_numpy(features), torch.from_numpy(poses))
+    np.testing.assert_allclose(there.numpy(), pair.decode(features, poses), atol=1e-12)
     for code in CODES:
-        numbers = code.encode(torch.from_numpy(stands))
-        np.testing.assert_allclose(numbers.numpy(), code.encode(stands), atol=1e-12)
-        np.testing.assert_allclose(code.decode(numbers).numpy(), code.decode(code.encode(stands)), atol=1e-12)
+        numbers = code.encode(torch.from_numpy(poses))
+        np.testing.assert_allclose(numbers.numpy(), code.encode(poses), atol=1e-12)
+        np.testing.assert_allclose(code.decode(numbers).numpy(), code.decode(code.encode(poses)), atol=1e-12)
 
 
 def test_no_direction_at_all_is_ahead() -> None:

@@ -32,11 +32,13 @@ def built(tmp_path: Path) -> Path:
     for k, split in enumerate(("train", "val", "test")):
         features = humanml.encode(walking(1.2, 5.0), heading="corrected")
         note = Note(0, len(features), "human", ("a person walks forward",))
-        write_clip(_made(tmp_path / "set" / "clips"), Clip(f"w{k}", "made", "none", split, "plain", (note,), features))
+        write_clip(
+            _folder(tmp_path / "set" / "clips"), Clip(f"w{k}", "made", "none", split, "plain", (note,), features)
+        )
     return tmp_path / "set"
 
 
-def _made(folder: Path) -> Path:
+def _folder(folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
@@ -44,9 +46,9 @@ def _made(folder: Path) -> Path:
 def test_obedience_prints_a_table_and_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main(["evaluate", "obedience", "--seeds", "2", "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "a person walks forward" in said
-    assert "2 of 20 prompts obeyed" in said
+    output = capsys.readouterr().out
+    assert "a person walks forward" in output
+    assert "2 of 20 prompts obeyed" in output
     assert "2 of 20 prompts obeyed" in (out / "report.md").read_text()
     assert json.loads((out / "obedience.json").read_text())["totals"]["prompts_obeyed"] == 2
 
@@ -65,12 +67,12 @@ def test_everyday_prompts_are_a_set_of_their_own_with_themes_and_a_sheet(
     out, sheet = tmp_path / "out", tmp_path / "all.png"
     typed = ["evaluate", "obedience", "--set", "everyday", *only, "--seeds", "2", "--out", str(out)]
     assert main([*typed, "--sheet", str(sheet)]) == 0
-    said = capsys.readouterr().out
-    assert "0 of 2 prompts obeyed" in said
-    assert "gaits, starts and stops" in said
-    kept = json.loads((out / "obedience.json").read_text())
-    assert kept["settings"]["first_seed"] == 100
-    assert [c["seconds"] for c in kept["checks"]] == [5.0, 4.0]
+    output = capsys.readouterr().out
+    assert "0 of 2 prompts obeyed" in output
+    assert "gaits, starts and stops" in output
+    results = json.loads((out / "obedience.json").read_text())
+    assert results["settings"]["first_seed"] == 100
+    assert [c["seconds"] for c in results["checks"]] == [5.0, 4.0]
     assert sheet.stat().st_size < 200_000
     sheet.unlink()
     assert main([*typed, "--sheet", str(sheet)]) == 0  # everything is measured already, and drawn all the same
@@ -106,9 +108,9 @@ def test_checks_are_tried_on_real_clips(built: Path, tmp_path: Path, capsys: pyt
 def test_realism_against_a_built_set(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "realism", "--data", str(built), "--out", str(tmp_path / "r")]) == 0
     assert "within 1.5 times of real" in capsys.readouterr().out
-    found = json.loads((tmp_path / "r" / "realism.json").read_text())
-    assert found["real_clips"] == found["generated_clips"] == 2  # val and test
-    assert found["numbers"]["speed_median"]["passes"]
+    numbers = json.loads((tmp_path / "r" / "realism.json").read_text())
+    assert numbers["real_clips"] == numbers["generated_clips"] == 2  # val and test
+    assert numbers["numbers"]["speed_median"]["passes"]
 
 
 def test_realism_without_recordings_says_what_it_compares_with(capsys: pytest.CaptureFixture[str]) -> None:
@@ -174,7 +176,7 @@ def test_mistakes_are_one_sentence_and_exit_code_2(words: list[str], capsys: pyt
     assert captured.out == ""
 
 
-def _fakes(asked: Mapping[str, Any]) -> Tools:
+def _fakes(options: Mapping[str, Any]) -> Tools:
     def speed(quick: bool) -> dict[str, Any]:
         entry = {"name": "help", "value": 0.1, "unit": "s", "target": "< 1", "passes": True, "note": ""}
         return {"machine": {"device": "x", "load": 0.0}, "quick": quick, "entries": [entry]}
@@ -197,20 +199,20 @@ def fakes(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_all_writes_reports_fills_the_page_and_keeps_a_release(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page, out, kept = tmp_path / "results.md", tmp_path / "out", tmp_path / "releases" / "1"
+    page, out, release = tmp_path / "results.md", tmp_path / "out", tmp_path / "releases" / "1"
     page.write_text("# Results\n\n<!-- suite obedience -->\nnothing\n<!-- end -->\n")
-    words = ["evaluate", "all", *PHYSICAL, "--quick", "--out", str(out), "--results", str(page), "--keep", str(kept)]
+    words = ["evaluate", "all", *PHYSICAL, "--quick", "--out", str(out), "--results", str(page), "--keep", str(release)]
     assert main(words) == 0
     assert "obedience: measured" in capsys.readouterr().out
     for suite in ("obedience", "realism", "speed"):
         assert read(out / suite).suite == suite
-        assert read(kept / f"{suite}.json").protocol["quick"] is True
+        assert read(release / f"{suite}.json").protocol["quick"] is True
         assert f"--only {suite} --weights default --quick" in page.read_text()
     filled = page.read_text()
     assert main(words) == 0
     assert "obedience: kept" in capsys.readouterr().out
     assert page.read_text() == filled
-    assert main(["evaluate", "compare", str(kept), str(out)]) == 0
+    assert main(["evaluate", "compare", str(release), str(out)]) == 0
     assert "0 worse and 0 better" in capsys.readouterr().out
 
 
@@ -242,9 +244,9 @@ def test_compare_exits_with_1_only_when_something_got_worse(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], after: float, code: int
 ) -> None:
     assert main(["evaluate", "compare", *_reports(tmp_path, 1.0, after)]) == code
-    said = capsys.readouterr().out
-    assert ("1 worse" in said) == (code == 1)
-    assert ("ours" in said) == (after != 1.1)
+    output = capsys.readouterr().out
+    assert ("1 worse" in output) == (code == 1)
+    assert ("ours" in output) == (after != 1.1)
 
 
 def test_compare_as_json_lists_every_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -258,7 +260,7 @@ def test_compare_of_other_protocols_is_2_and_anyway_compares(
 ) -> None:
     paths = _reports(tmp_path, 1.0, 2.0, batch=-32)
     assert main(["evaluate", "compare", *paths]) == 2
-    told = capsys.readouterr().err
-    assert "batch -32 -> -64" in told
-    assert told.count("\n") == 1
+    message = capsys.readouterr().err
+    assert "batch -32 -> -64" in message
+    assert message.count("\n") == 1
     assert main(["evaluate", "compare", *paths, "--anyway"]) == 1

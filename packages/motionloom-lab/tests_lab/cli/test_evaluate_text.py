@@ -46,10 +46,10 @@ def test_a_run_prints_a_table_writes_a_report_and_goes_on(
     first = capsys.readouterr()
     assert "tiny, 3 steps" in first.out
     assert "replication 2 of 2" in first.err
-    found = json.loads((tmp_path / "out" / "report.json").read_text())
-    assert "--data SET" in found["command"]
-    assert built not in found["command"]
-    assert {row["name"] for row in found["rows"] if not row["measured_on"]} == {
+    results = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert "--data SET" in results["command"]
+    assert built not in results["command"]
+    assert {row["name"] for row in results["rows"] if not row["measured_on"]} == {
         "real",
         "real, captions shuffled",
         "chance",
@@ -59,30 +59,30 @@ def test_a_run_prints_a_table_writes_a_report_and_goes_on(
     assert "Protocol" in (tmp_path / "out" / "report.md").read_text()
     monkeypatch.setattr("motionloom_lab.suites.text.sample_features", lambda *a, **k: pytest.fail("drawn twice"))
     assert main([*command, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == found
+    assert json.loads(capsys.readouterr().out) == results
     assert main([*command, "--seed", "3"]) == 2
     assert "other settings" in capsys.readouterr().err
 
 
 def test_the_same_seed_gives_the_same_numbers(weights: str, built: str, capsys: pytest.CaptureFixture[str]) -> None:
-    found = []
+    tables = []
     for _ in range(2):
         assert main(["evaluate", "text", "--weights", weights, "--data", built, *FEW, "--json"]) == 0
         rows = json.loads(capsys.readouterr().out)["rows"]
-        found.append([(r["name"], r["values"].get("fid"), r["values"].get("mm_dist")) for r in rows])
-    assert found[0] == found[1]
+        tables.append([(r["name"], r["values"].get("fid"), r["values"].get("mm_dist")) for r in rows])
+    assert tables[0] == tables[1]
 
 
 def test_without_data_the_shipped_reference_is_measured_against(
     weights: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = text_reference.measure([item(k) for k in range(9)], Judge(), Selection())
-    path = text_reference.save(made, tmp_path / "shipped.safetensors")
+    reference = text_reference.measure([item(k) for k in range(9)], Judge(), Selection())
+    path = text_reference.save(reference, tmp_path / "shipped.safetensors")
     monkeypatch.setattr(text_reference, "shipped", lambda: path)
     assert main(["evaluate", "text", "--weights", weights, *FEW, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["protocol"]["items"] == 9
-    assert "--data" not in found["command"]
+    results = json.loads(capsys.readouterr().out)
+    assert results["protocol"]["items"] == 9
+    assert "--data" not in results["command"]
     assert main(["evaluate", "text", "--weights", weights, "--sources", "all", *FEW]) == 2
     assert "--data" in capsys.readouterr().err
 
@@ -98,9 +98,9 @@ def test_quick_is_one_batch_and_says_so_in_its_command(
     weights: str, built: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["evaluate", "text", "--weights", weights, "--data", built, *FEW, "--quick", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["protocol"]["items"] == 4
-    assert found["command"].endswith("--quick")
+    results = json.loads(capsys.readouterr().out)
+    assert results["protocol"]["items"] == 4
+    assert results["command"].endswith("--quick")
 
 
 @pytest.mark.parametrize(

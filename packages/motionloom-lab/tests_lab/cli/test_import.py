@@ -35,12 +35,12 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one sentence on stderr; nothing is written."""
     before = sorted(Path().rglob("*"))
     assert main(list(words)) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    assert "Traceback" not in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.count("\n") == 1
+    assert "Traceback" not in output.err
     assert sorted(Path().rglob("*")) == before
-    return said.err
+    return output.err
 
 
 def test_an_imported_checkpoint_is_a_prior_with_its_card(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,9 +63,9 @@ def test_an_imported_checkpoint_is_a_prior_with_its_card(folder: Path, capsys: p
     assert prior.card.notes["imported_from"] == "model000200000.pt"
     assert "/home/x" not in json.dumps(prior.card.notes)
     assert main(["weights", "a.safetensors"]) == 0
-    said = capsys.readouterr().out
-    assert "research only" in said
-    assert "humanml" in said
+    output = capsys.readouterr().out
+    assert "research only" in output
+    assert "humanml" in output
 
 
 def test_missing_options_are_warned_of_and_babel_makes_motions(
@@ -95,8 +95,8 @@ def test_missing_options_are_warned_of_and_babel_makes_motions(
         return Words()
 
     monkeypatch.setattr("motionloom_train.nets.text.hub.ClipText.open", clip)
-    asked = ["--weights", "b.safetensors", "--seconds", "0.5", "--steps", "2", "--out", "a.bvh"]
-    assert main(["generate", "walk", *asked]) == 0
+    arguments = ["--weights", "b.safetensors", "--seconds", "0.5", "--steps", "2", "--out", "a.bvh"]
+    assert main(["generate", "walk", *arguments]) == 0
     motion = load("a.bvh")
     assert (len(motion), round(motion.fps), opened) == (15, 30, [77])
 
@@ -140,13 +140,13 @@ TWO = ["import", "model000200000.pt", "--out", "a.safetensors", *STATISTICS]
 def test_a_checkpoint_of_two_people_becomes_a_prior_and_its_block(
     folder: Path, capsys: pytest.CaptureFixture[str], half: list[str]
 ) -> None:
-    given = test_pair.published()
-    write(folder, given, {"layers": 5, "multi_func": "in_both_out_cond"})
+    state = test_pair.published()
+    write(folder, state, {"layers": 5, "multi_func": "in_both_out_cond"})
     assert main([*TWO, "--name", "dance", "--licence", "research only", *half]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert [line.split()[1].strip(",") for line in said] == ["a.safetensors", "a-pair.safetensors"]
+    output = capsys.readouterr().out.splitlines()
+    assert [line.split()[1].strip(",") for line in output] == ["a.safetensors", "a-pair.safetensors"]
     prior = load_prior(Path("a.safetensors"))
-    end = given["seqTransEncoder_end.layers.0.norm2.bias"]
+    end = state["seqTransEncoder_end.layers.0.norm2.bias"]
     np.testing.assert_allclose(prior.net.weights["net.blocks.3.norm2.bias"], end.numpy(), atol=1e-3)
     block = PairBlock.load("a-pair.safetensors", prior)
     assert (block.name, block.base, block.licence, block.config.adds) == (
@@ -155,27 +155,27 @@ def test_a_checkpoint_of_two_people_becomes_a_prior_and_its_block(
         "research only",
         "condition",
     )
-    np.testing.assert_allclose(block.tensors["place.weight"], given["multi_person.canon_out.weight"].numpy(), atol=1e-3)
+    np.testing.assert_allclose(block.tensors["place.weight"], state["multi_person.canon_out.weight"].numpy(), atol=1e-3)
     assert main(["weights", "a-pair.safetensors"]) == 0
     card = capsys.readouterr().out
     assert all(word in card for word in ("dance-pair", "two-person block", "research only", "3DPW", "behind 3"))
     assert main(["weights", "a-pair.safetensors", "--json"]) == 0
     about = json.loads(capsys.readouterr().out)
     assert about["belongs_to"] == {"name": "dance", "fingerprint": block.fingerprint}
-    assert about["parameters"] == sum(v.numel() for k, v in given.items() if k.startswith("multi_person."))
+    assert about["parameters"] == sum(v.numel() for k, v in state.items() if k.startswith("multi_person."))
 
 
 def test_of_two_people_both_files_are_written_or_none(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    given, one = test_pair.published(), "multi_person.canon_out.weight"
+    state, one = test_pair.published(), "multi_person.canon_out.weight"
     Path("a-pair.safetensors").mkdir()
-    write(folder, given)
+    write(folder, state)
     assert "folder" in refused_after_warnings(capsys, *TWO)
     Path("a-pair.safetensors").rmdir()
-    write(folder, given, {"multi_func": "in_both_out_direct"})
+    write(folder, state, {"multi_func": "in_both_out_direct"})
     assert "multi_func" in refused_after_warnings(capsys, *TWO)
-    write(folder, given | {one: torch.zeros(5, 16)})
+    write(folder, state | {one: torch.zeros(5, 16)})
     assert "place.weight" in refused_after_warnings(capsys, *TWO)
-    write(folder, given)
+    write(folder, state)
     assert "--mean" in refused(capsys, "import", "model000200000.pt", "--out", "a.safetensors")
 
 
@@ -183,9 +183,9 @@ def refused_after_warnings(capsys: pytest.CaptureFixture[str], *words: str) -> s
     """The last sentence on stderr; nothing is written."""
     before = sorted(Path().rglob("*"))
     assert main(list(words)) == 2
-    said = capsys.readouterr()
-    assert (said.out, sorted(Path().rglob("*"))) == ("", before)
-    return said.err.splitlines()[-1]
+    output = capsys.readouterr()
+    assert (output.out, sorted(Path().rglob("*"))) == ("", before)
+    return output.err.splitlines()[-1]
 
 
 EVALUATOR = ["import", "finest.tar", "--out", "guo.safetensors"]
@@ -200,12 +200,12 @@ def test_an_imported_evaluator_is_one_file_that_says_what_it_is(
     statistics = ["--mean", "elsewhere/t2m_mean.npy", "--std", "elsewhere/t2m_std.npy"]
     words = ["--glove", "elsewhere", "--vip", "elsewhere/word_vectorizer.py"]
     assert main([*EVALUATOR, *statistics, *words, "--licence", "research only"]) == 0
-    said = capsys.readouterr()
-    assert said.err == ""
-    assert all(word in said.out for word in ("research only", "weighs 25 times", "6 vectors", "true, with sos"))
-    found = load_guo("guo.safetensors")
-    assert found.motions([test_guo.motion(40)]).shape == (1, 9)
-    assert found.texts(test_guo.CAPTIONS).shape == (3, 9)
+    output = capsys.readouterr()
+    assert output.err == ""
+    assert all(word in output.out for word in ("research only", "weighs 25 times", "6 vectors", "true, with sos"))
+    evaluator = load_guo("guo.safetensors")
+    assert evaluator.motions([test_guo.motion(40)]).shape == (1, 9)
+    assert evaluator.texts(test_guo.CAPTIONS).shape == (3, 9)
 
 
 def test_an_evaluator_without_its_files_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

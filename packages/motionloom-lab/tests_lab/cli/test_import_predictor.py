@@ -26,11 +26,11 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one sentence on stderr; nothing is written."""
     before = sorted(Path().rglob("*"))
     assert main(list(words)) == 2
-    said = capsys.readouterr()
-    assert (said.out, said.err.count("\n")) == ("", 1)
-    assert "Traceback" not in said.err
+    output = capsys.readouterr()
+    assert (output.out, output.err.count("\n")) == ("", 1)
+    assert "Traceback" not in output.err
     assert sorted(Path().rglob("*")) == before
-    return said.err
+    return output.err
 
 
 @pytest.mark.parametrize("half", [[], ["--half"]], ids=["whole", "half"])
@@ -39,11 +39,18 @@ def test_a_checkpoint_becomes_a_predictor_that_says_what_it_is(
 ) -> None:
     assert main([*START, "--licence", "research only", "--name", "humanmac", *half]) == 0
     assert capsys.readouterr().err == ""
-    made = Predictor.load("a.safetensors")
-    assert (made.variant, made.observed, made.frames, made.card.name) == ("published", 25, 125, "humanmac")
+    predictor = Predictor.load("a.safetensors")
+    assert (predictor.variant, predictor.observed, predictor.frames, predictor.card.name) == (
+        "published",
+        25,
+        125,
+        "humanmac",
+    )
     assert main(["weights", "a.safetensors"]) == 0
-    said = capsys.readouterr().out
-    assert all(word in said for word in ("research only", "Human3.6M", "17 joints", "100 frames after 25", "published"))
+    output = capsys.readouterr().out
+    assert all(
+        word in output for word in ("research only", "Human3.6M", "17 joints", "100 frames after 25", "published")
+    )
     assert main(["weights", "a.safetensors", "--json"]) == 0
     about = json.loads(capsys.readouterr().out)
     assert (about["frames_per_second"], about["frames"]) == (50, {"observed": 25, "predicted": 100})

@@ -24,9 +24,9 @@ def recorded_denoiser(recorded: Case) -> Denoiser:
         filled = weights(keys, config["seed"], m)
         nets.append(prior_session(from_published({name: torch.from_numpy(array) for name, array in filled.items()})))
     text = np.asarray(normal(stream(config["seed"], TEXT), (rows, 512)))
-    given = np.broadcast_to(mask(config["mask"]), (rows, config["shape"][3], 263))
+    flags = np.broadcast_to(mask(config["mask"]), (rows, config["shape"][3], 263))
     return blended(
-        nets, condition(text), np.zeros_like(given), given, weights=config["weights"], guidance=config["guidance"]
+        nets, condition(text), np.zeros_like(flags), flags, weights=config["weights"], guidance=config["guidance"]
     )
 
 

@@ -19,14 +19,14 @@ def as_sampling(recorded: Case, shape: tuple[int, ...]):
 def networks(recorded: Case):
     """Denoisers of the first and of the second take."""
     config, rows = recorded.config, len(recorded.config["lengths"])
-    made = {"dummy": dummy, "mdm": published_network}[config["network"]]
+    nets = {"dummy": dummy, "mdm": published_network}[config["network"]]
     shape = (rows, config["channels"], 1, max(config["lengths"]))
-    net, cond, null = made(as_sampling(recorded, shape))  # type: ignore[arg-type]
+    net, cond, null = nets(as_sampling(recorded, shape))  # type: ignore[arg-type]
     nothing = null[: rows - 1] if isinstance(null, np.ndarray) else type(null)(*(part[: rows - 1] for part in null))
     return guide(net, cond, null, config["guidance"]), guide(net, nothing, nothing, 0.0)
 
 
-def taken(recorded: Case) -> tuple[Takes, int]:
+def takes_of(recorded: Case) -> tuple[Takes, int]:
     """The run, and how often noise was drawn."""
     config, count = recorded.config, 0
     noise = as_sampling(recorded, ())
@@ -59,7 +59,7 @@ def taken(recorded: Case) -> tuple[Takes, int]:
 
 @pytest.mark.parametrize("recorded", cases("double_take", kind="double_take"))
 def test_both_takes_give_the_published_numbers(recorded):
-    takes, count = taken(recorded)
+    takes, count = takes_of(recorded)
     plan = Plan.of(recorded.config["lengths"], recorded.config["handshake"], recorded.config["blend"])
     assert count == recorded.config["noise_draws"]
     compare(recorded, "first_take", to_motion(takes.first))

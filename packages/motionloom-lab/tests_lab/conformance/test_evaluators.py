@@ -30,21 +30,21 @@ def embeddings(recorded: Case) -> dict[str, np.ndarray]:
     frames = torch.from_numpy(normal(stream(seed, MOTION), (rows, config["frames"], config["channels"])))
     words = torch.from_numpy(normal(stream(seed, TEXT), (rows, 22, 300)))
     tags = torch.eye(15)[torch.from_numpy(stream(seed, MASK).integers(0, 15, (rows, 22)))]
-    shown = frames[..., :-4] if config["drop_contacts"] else frames
+    inputs = frames[..., :-4] if config["drop_contacts"] else frames
     order = published_order(config["motion_lengths"])
     return {
         "order": order,
-        "movement": guo.movement_encoder(shown).numpy(),
-        "motion_embedding_sorted": guo.motions(shown, config["motion_lengths"]).numpy()[order],
+        "movement": guo.movement_encoder(inputs).numpy(),
+        "motion_embedding_sorted": guo.motions(inputs, config["motion_lengths"]).numpy()[order],
         "text_embedding_sorted": guo.texts(words, tags, config["caption_lengths"]).numpy()[order],
     }
 
 
 @pytest.mark.parametrize("recorded", cases("evaluators", kind="evaluator"))
 def test_published_encoders_give_the_recorded_embeddings(recorded: Case) -> None:
-    found = embeddings(recorded)
-    assert found.keys() == recorded.outputs.keys()
-    for output, array in found.items():
+    points = embeddings(recorded)
+    assert points.keys() == recorded.outputs.keys()
+    for output, array in points.items():
         compare(recorded, output, array)
 
 
@@ -70,12 +70,12 @@ def test_other_seeds_and_shapes_follow_a_plain_loop_alone_and_in_a_batch(seed: i
     words = torch.from_numpy(normal(stream(seed, TEXT), (3, 22, 300)))
     tags = torch.eye(15)[torch.from_numpy(stream(seed, MASK).integers(0, 15, (3, 22)))]
     lengths, counts = [frames, 40, 59], [22, 3, 11]
-    moved, said = guo.motions(x, lengths), guo.texts(words, tags, counts)
+    moved, sentences = guo.motions(x, lengths), guo.texts(words, tags, counts)
     for row, (length, count) in enumerate(zip(lengths, counts, strict=True)):
         one = slice(row, row + 1)
         np.testing.assert_allclose(moved[row], naive.motion(x[row].double().numpy(), length), atol=1e-4)
         np.testing.assert_allclose(
-            said[row], naive.text(words[row].double().numpy(), tags[row].double().numpy(), count), atol=1e-4
+            sentences[row], naive.text(words[row].double().numpy(), tags[row].double().numpy(), count), atol=1e-4
         )
         np.testing.assert_allclose(moved[row], guo.motions(x[one], [length])[0], atol=1e-5)
-        np.testing.assert_allclose(said[row], guo.texts(words[one], tags[one], [count])[0], atol=1e-5)
+        np.testing.assert_allclose(sentences[row], guo.texts(words[one], tags[one], [count])[0], atol=1e-5)

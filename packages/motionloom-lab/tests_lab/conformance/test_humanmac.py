@@ -52,8 +52,8 @@ def filled(config: Settings) -> PredictorSession:
 def test_the_network_gives_the_recorded_guess(recorded: Case) -> None:
     config, net = recorded.config, filled(recorded.config)
     shape = config["batch"], config["coefficients"], 3 * config["joints"]
-    x, told = (np.asarray(normal(stream(config["seed"], k), shape)) for k in (MOTION, TEXT))
-    compare(recorded, "conditional", net(x, np.array(config["timesteps"]), told))
+    x, condition = (np.asarray(normal(stream(config["seed"], k), shape)) for k in (MOTION, TEXT))
+    compare(recorded, "conditional", net(x, np.array(config["timesteps"]), condition))
     compare(recorded, "unconditional", net(x, np.array(config["timesteps"])))
 
 
@@ -63,10 +63,10 @@ def test_names_and_shapes_of_the_weights_are_the_published_ones(recorded: Case) 
     layers = {name.split(".")[1] for name in keys if name.startswith("temporal_decoder_blocks.")}
     with torch.device("meta"):
         net = TransLinear(PredictorConfig(keys["out.bias"][0], keys["sequence_embedding"][0], len(layers)))
-    found = {name: list(value.shape) for name, value in net.state_dict().items()}
-    assert found == {name: list(shape) for name, shape in keys.items()}
+    shapes = {name: list(value.shape) for name, value in net.state_dict().items()}
+    assert shapes == {name: list(shape) for name, shape in keys.items()}
     assert sum(p.numel() for p in net.parameters()) == recorded.lists["n_parameters"]
-    assert len(found) == recorded.lists["n_entries"]
+    assert len(shapes) == recorded.lists["n_entries"]
 
 
 def counted(draw: NoiseSource) -> tuple[NoiseSource, list[tuple[int, ...]]]:
@@ -91,11 +91,11 @@ def test_whole_runs_give_the_published_motions(recorded: Case) -> None:
     spectrum = np.broadcast_to(
         basis.to_spectrum(padded(motion[:, :h], frames, padding)), (n, basis.kept, motion.shape[2])
     )
-    told = None if config["unconditional"] else spectrum
+    condition = None if config["unconditional"] else spectrum
 
     def noise(x: np.ndarray, level: int) -> np.ndarray:
         b = schedule.at(level)[1]
-        return b * x + 0.1 * net(x, np.full((len(x),), level - 1), told)
+        return b * x + 0.1 * net(x, np.full((len(x),), level - 1), condition)
 
     rng = stream(seed, NOISE)
     draw, shapes = counted(lambda like: np.asarray(normal(rng, like.shape)).astype(like.dtype))
@@ -177,8 +177,8 @@ def float32_cosine(steps: int) -> Schedule:
 
     The formula in float64 has 4e-4 more noise at the first level (0.99995872 of signal, not 0.99995875).
     """
-    kept = torch.cos((torch.linspace(0, steps, steps + 1) / steps + 0.008) / 1.008 * torch.pi / 2) ** 2
-    betas = (1 - kept[1:] / kept[:-1]).clamp(0, 0.999)
+    shares = torch.cos((torch.linspace(0, steps, steps + 1) / steps + 0.008) / 1.008 * torch.pi / 2) ** 2
+    betas = (1 - shares[1:] / shares[:-1]).clamp(0, 0.999)
     schedule = from_betas("cosine in float32", betas.numpy())
     signal = torch.cat([torch.ones(1), torch.cumprod(1 - betas, dim=0)]).numpy()
     schedule.__dict__["alpha_bar"] = signal.astype(np.float64)  # what the cached property would compute in float64
@@ -198,22 +198,22 @@ def test_networks_filled_with_waves_give_the_reference_sums(name: str, count: st
         state[key].copy_(torch.from_numpy(values).reshape(state[key].shape))
     shape = (2, kept, channels)
     session = predictor_session(net)
-    for key, told in (("forward_mod", wave(shape, 0.021, 1.0)), ("forward_nomod", None)):
-        guess = session(wave(shape, 0.05, 0.2), np.array([1, 500]), told)
+    for key, condition in (("forward_mod", wave(shape, 0.021, 1.0)), ("forward_nomod", None)):
+        guess = session(wave(shape, 0.05, 0.2), np.array([1, 500]), condition)
         check(guess, recorded[key], near=1e-3)
 
 
 def test_the_time_embedding_has_cosines_first() -> None:
-    recorded, made = sums(), waves(torch.tensor([500]), 512)[0].tolist()
-    assert made[:4] == pytest.approx(recorded["timestep_embedding_500_first4"], abs=1e-4)
-    assert made[256:260] == pytest.approx(recorded["timestep_embedding_500_at256"], abs=1e-4)
+    recorded, embedding = sums(), waves(torch.tensor([500]), 512)[0].tolist()
+    assert embedding[:4] == pytest.approx(recorded["timestep_embedding_500_first4"], abs=1e-4)
+    assert embedding[256:260] == pytest.approx(recorded["timestep_embedding_500_at256"], abs=1e-4)
 
 
 def test_every_schedule_has_the_reference_anchors() -> None:
     for name, anchors in sums()["alpha_hat"].items():
         schedule = SCHEDULES[name.lower()](1000)
-        found = {index: float(schedule.alpha_bar[int(index) + 1]) for index in anchors}
-        assert found == pytest.approx(anchors, abs=1e-6), name
+        values = {index: float(schedule.alpha_bar[int(index) + 1]) for index in anchors}
+        assert values == pytest.approx(anchors, abs=1e-6), name
 
 
 def oracle(name: str, case: str) -> tuple[np.ndarray, np.ndarray, int]:

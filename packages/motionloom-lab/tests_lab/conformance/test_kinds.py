@@ -14,19 +14,19 @@ Kind = tuple[str, str]
 
 def recorded_kinds(folder: Path) -> set[Kind]:
     """(group, kind) of every recorded case; ("", file) of every file that holds no cases."""
-    found: set[Kind] = set()
+    kinds: set[Kind] = set()
     for path in sorted(folder.glob("*.json")):
         content = json.loads(path.read_text())
-        found |= {(path.stem, case["config"]["kind"]) for case in content.get("cases", [])} or {("", path.name)}
-    return found
+        kinds |= {(path.stem, case["config"]["kind"]) for case in content.get("cases", [])} or {("", path.name)}
+    return kinds
 
 
 def asked_kinds(source: str) -> Iterator[tuple[str, str | None]]:
     """(group, kind or None for all) of every call of `cases` in a module; ("", file) of every call of `recorded`."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("cases", "recorded"):
-            given = {None: node.args[0]} | {word.arg: word.value for word in node.keywords}
-            values = {name: value.value for name, value in given.items() if isinstance(value, ast.Constant)}
+            arguments = {None: node.args[0]} | {word.arg: word.value for word in node.keywords}
+            values = {name: value.value for name, value in arguments.items() if isinstance(value, ast.Constant)}
             if node.func.id == "recorded" and None in values:
                 yield "", str(values[None])
             elif None in values:
@@ -35,13 +35,13 @@ def asked_kinds(source: str) -> Iterator[tuple[str, str | None]]:
 
 def compared_by(sources: Mapping[str, str], kinds: set[Kind]) -> dict[Kind, list[str]]:
     """The modules that compare each kind."""
-    found: dict[Kind, list[str]] = defaultdict(list)
+    files: dict[Kind, list[str]] = defaultdict(list)
     for module, source in sources.items():
         asked = set(asked_kinds(source))
         for group, kind in sorted(kinds):
             if (group, kind) in asked or (group and (group, None) in asked):
-                found[group, kind].append(module)
-    return found
+                files[group, kind].append(module)
+    return files
 
 
 def test_every_recorded_kind_is_compared_by_some_module() -> None:

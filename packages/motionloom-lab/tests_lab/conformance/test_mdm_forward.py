@@ -11,8 +11,8 @@ from tests.conformance.runner import MOTION, TEXT, Case, case, cases, compare, n
 
 def shapes_of(channels: int, *, flagged: bool) -> dict[str, list[int]]:
     """Names and shapes of the recorded network of so many channels, with or without an embedding of transitions."""
-    for found in (param.values[0] for param in cases("mdm_forward", kind="state_dict")):
-        keys = found.lists["keys"] if found else {}
+    for record in (param.values[0] for param in cases("mdm_forward", kind="state_dict")):
+        keys = record.lists["keys"] if record else {}
         wide = keys.get("output_process.poseFinal.weight", [0])[0] == channels
         if wide and flagged == ("emb_trans_or_not.weight" in keys):
             return keys

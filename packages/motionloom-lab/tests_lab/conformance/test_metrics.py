@@ -55,8 +55,8 @@ def test_multimodality_is_the_published_one(case):
 @pytest.mark.parametrize("case", cases("metrics", kind="jerk"))
 def test_jerk_of_transitions_is_the_published_one(case):
     c = case.config
-    drawn = normal(stream(c["seed"], MOTION), (c["batch"], c["frames"], 22, 3)).astype(np.float64)
-    joints = (0.01 * np.cumsum(np.cumsum(0.2 * drawn, axis=1), axis=1)).astype(np.float32)
+    positions = normal(stream(c["seed"], MOTION), (c["batch"], c["frames"], 22, 3)).astype(np.float64)
+    joints = (0.01 * np.cumsum(np.cumsum(0.2 * positions, axis=1), axis=1)).astype(np.float32)
     curve = transitions.jerk_curve(joints, c["lengths"])
     compare(case, "per_sequence", transitions.sequence_jerk(joints, c["lengths"]))
     compare(case, "curve", curve)

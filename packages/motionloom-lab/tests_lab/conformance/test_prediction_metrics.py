@@ -19,21 +19,21 @@ def test_every_recorded_metric_of_the_published_code_comes_out(case: Case) -> No
     futures = np.concatenate([f32(0.4) * base, extra])
     limbs = pr.Limbs(tuple(map(tuple, c["limbs"])), tuple(map(tuple, c["limb_angle_chains"])))
     assert limbs == pr.H36M_LIMBS
-    found = pr.score_window(samples, futures[0], futures, fps=50, limbs=limbs).numbers
+    numbers = pr.score_window(samples, futures[0], futures, fps=50, limbs=limbs).numbers
     cmd = pr.CmdTally()
     cmd.add("walk", samples)
     values = {
-        "apd": found["apd"],
-        "ade": found["ade"],
-        "fde": found["fde"],
-        "mmade": found["mmade"],
-        "mmfde": found["mmfde"],
+        "apd": numbers["apd"],
+        "ade": numbers["ade"],
+        "fde": numbers["fde"],
+        "mmade": numbers["mmade"],
+        "mmfde": numbers["mmfde"],
         "cmd": cmd.result(c["cmd_reference"]),
-        "stretch_mean_percent": found["stretch"],
-        "stretch_rmse_percent": found["stretch_rmse"],
-        "jitter_mean_percent": found["jitter"],
-        "jitter_rmse_percent": found["jitter_rmse"],
-        "angle_error_degrees": found["mae"],
+        "stretch_mean_percent": numbers["stretch"],
+        "stretch_rmse_percent": numbers["stretch_rmse"],
+        "jitter_mean_percent": numbers["jitter"],
+        "jitter_rmse_percent": numbers["jitter_rmse"],
+        "angle_error_degrees": numbers["mae"],
     }
     for name, value in values.items():
         compare(case, name, value)

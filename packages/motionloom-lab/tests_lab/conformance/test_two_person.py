@@ -77,7 +77,7 @@ def person(state: Tensor, k: int) -> np.ndarray:
     return state[k::2].numpy().swapaxes(1, 2)[:, :, None]
 
 
-def drawn(recorded: Case, k: int) -> Iterator[Tensor]:
+def noises(recorded: Case, k: int) -> Iterator[Tensor]:
     config = recorded.config
     rng, shape = stream(config["seed"], k), (config["batch"], channels_of(recorded), 1, config["frames"] + 1)
     while True:
@@ -89,7 +89,7 @@ def drawn(recorded: Case, k: int) -> Iterator[Tensor]:
 def test_both_answers_of_one_call_are_the_published_ones(recorded: Case):
     config = recorded.config
     net = net_of(recorded)
-    state = next(drawn(recorded, MOTION))
+    state = next(noises(recorded, MOTION))
     level = torch.tensor(config["timesteps"]).repeat_interleave(2) + 1
     guess = net(state, level, bound_of(net, config))
     compare(recorded, "out", person(guess, 0))
@@ -113,7 +113,7 @@ def test_whole_runs_of_two_people_give_the_published_samples(recorded: Case):
     config = recorded.config
     net, schedule = net_of(recorded), cosine(config["steps"])
     bound = bound_of(net, config)
-    noise, count = drawn(recorded, NOISE), 0
+    noise, count = noises(recorded, NOISE), 0
 
     def draw(like: Tensor) -> Tensor:
         nonlocal count
@@ -123,19 +123,19 @@ def test_whole_runs_of_two_people_give_the_published_samples(recorded: Case):
     def denoise(x: Tensor, level: int) -> Tensor:
         return net(x, level, bound)
 
-    told: Denoiser = denoise
+    denoiser: Denoiser = denoise
     constraints, start = [], None
     if config["prefix"]:
-        known = next(drawn(recorded, KNOWN))
+        known = next(noises(recorded, KNOWN))
         mask = torch.zeros_like(known, dtype=torch.bool)
         mask[:, :GIVEN] = True
-        told = inpaint(denoise, known, mask)
+        denoiser = inpaint(denoise, known, mask)
         constraints.append(observe(known, mask, schedule, torch.zeros_like))
         start = constraints[0](restart(known, schedule, schedule.steps, draw), schedule.steps)
     if start is None:
         start = draw(torch.empty(0))
     walk = range(schedule.steps, -1, -1)
-    x = run(told, start, levels=walk, solver=DDPM, schedule=schedule, noise=draw, constrain=chain(*constraints))
+    x = run(denoiser, start, levels=walk, solver=DDPM, schedule=schedule, noise=draw, constrain=chain(*constraints))
     assert count == config["noise_draws"]
     compare(recorded, "person0", person(x, 0))
     compare(recorded, "person1", person(x, 1))

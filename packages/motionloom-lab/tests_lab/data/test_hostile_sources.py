@@ -89,8 +89,8 @@ def test_a_clip_is_listed_once(tmp_path: Path, lists: list[str], named: str) -> 
         (tmp_path / part).mkdir()
     np.save(tmp_path / "new_joint_vecs" / "1.npy", np.zeros((50, 263), np.float32))
     (tmp_path / "texts" / "1.txt").write_text("a man walks#a/DET#0.0#0.0")
-    for split, said in zip(("train", "val", "test"), lists, strict=True):
-        (tmp_path / f"{split}.txt").write_text(said)
+    for split, names in zip(("train", "val", "test"), lists, strict=True):
+        (tmp_path / f"{split}.txt").write_text(names)
     with pytest.raises(MotionloomError, match=named):
         find_takes(tmp_path)
     with pytest.raises(MotionloomError, match=named):

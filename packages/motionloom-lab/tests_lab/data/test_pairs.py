@@ -77,9 +77,9 @@ def test_both_layouts_of_names_are_read_and_ten_pairs_are_split(recorded, tmp_pa
             target = tmp_path / (f"p{n}/{person}.bvh" if n % 2 else f"p{n}_{person}.bvh")
             target.parent.mkdir(exist_ok=True)
             shutil.copy(recorded / f"walk_{person}.bvh", target)
-    found = dp._pair_files(tmp_path)
-    assert sorted(found) == [f"p{n}" for n in range(10)]
-    assert found["p1"] == (tmp_path / "p1/a.bvh", tmp_path / "p1/b.bvh")
+    files = dp._pair_files(tmp_path)
+    assert sorted(files) == [f"p{n}" for n in range(10)]
+    assert files["p1"] == (tmp_path / "p1/a.bvh", tmp_path / "p1/b.bvh")
     pairs = dp.read_pair_folder(tmp_path, captions=False)
     assert [pair.split for pair in pairs] == ["train"] * 4 + ["val"] + ["train"] * 4 + ["test"]
 
@@ -328,10 +328,10 @@ def test_a_3dpw_sequence_comes_upright_at_20_frames_with_its_places(tmp_path, tu
     write_sequence(tmp_path / "sequenceFiles/validation/alone_00.pkl", world[:1], camera, turn=turn)
     (tmp_path / "text/train").mkdir(parents=True)
     (tmp_path / "text/train/dance_00.txt").write_text("two people walk#two/NUM people/NOUN#0.0#0.0\nthey go\n")
-    told: list[str] = []
-    (pair,) = threedpw.read_3dpw(tmp_path, say=told.append)
+    lines: list[str] = []
+    (pair,) = threedpw.read_3dpw(tmp_path, say=lines.append)
     assert (pair.name, pair.split, pair.captions) == ("dance_00", "train", ("two people walk", "they go"))
-    assert told == ["left out alone_00.pkl: 1 person"]
+    assert lines == ["left out alone_00.pkl: 1 person"]
     assert pair.frames == 80
     expected = np.stack([hml.resample_positions(person, 30.0) for person in world])
     np.testing.assert_allclose(mp.distance(pair.positions), mp.distance(expected), atol=5e-3)
@@ -344,18 +344,18 @@ def test_drift_that_the_camera_shares_is_taken_from_both_alike():
     world = at_30()
     drift = np.linspace(0, 1, world.shape[1])[:, None] * np.array([0.6, 0.0, -0.3])
     still = np.tile([0.0, 1.6, -4.0], (world.shape[1], 1))
-    found = threedpw.without_drift(world + drift[:, None], still + drift)
-    np.testing.assert_allclose(found[:, 15:-15], world[:, 15:-15] + (found - world)[:, :1].mean(), atol=0.12)
-    left = (found - world)[:, -20, 0] - (found - world)[:, 20, 0]
+    people = threedpw.without_drift(world + drift[:, None], still + drift)
+    np.testing.assert_allclose(people[:, 15:-15], world[:, 15:-15] + (people - world)[:, :1].mean(), atol=0.12)
+    left = (people - world)[:, -20, 0] - (people - world)[:, 20, 0]
     assert np.linalg.norm(left) < 0.25 * np.linalg.norm(drift[-20] - drift[20]) * np.sqrt(2)
-    np.testing.assert_allclose(found[1] - found[0], world[1] - world[0], atol=1e-12)
+    np.testing.assert_allclose(people[1] - people[0], world[1] - world[0], atol=1e-12)
 
 
 def test_a_camera_that_follows_takes_nothing_from_people_whose_feet_stand():
     world = at_30()
     follow = np.arange(world.shape[1])[:, None] / 30 * np.array([0.0, 0.0, 0.7])
-    found = threedpw.without_drift(world, follow)
-    assert np.abs(found - world).max() < 0.1 * 0.7 * 4
+    people = threedpw.without_drift(world, follow)
+    assert np.abs(people - world).max() < 0.1 * 0.7 * 4
 
 
 def test_the_camera_is_where_the_extrinsics_see_the_origin_from():
@@ -364,9 +364,9 @@ def test_the_camera_is_where_the_extrinsics_see_the_origin_from():
     poses = np.tile(np.eye(4), (5, 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = look, -look @ place
     poses[2] = 7.0  # not aligned to the image: between its neighbours
-    found = threedpw._camera({"cam_poses": poses, "campose_valid": [np.array([1, 1, 0, 1, 1])]}, 5, Path("x.pkl"))
-    assert found is not None
-    np.testing.assert_allclose(found, np.tile(place, (5, 1)))
+    path = threedpw._camera({"cam_poses": poses, "campose_valid": [np.array([1, 1, 0, 1, 1])]}, 5, Path("x.pkl"))
+    assert path is not None
+    np.testing.assert_allclose(path, np.tile(place, (5, 1)))
 
 
 def damaged(content: dict, what: str) -> dict:

@@ -53,53 +53,53 @@ def motions() -> list[np.ndarray]:
 
 def test_points_are_unit_vectors(motions: list[np.ndarray]) -> None:
     """Of motions and of sentences."""
-    made = embedder()
-    for points in (made.motions(motions), made.texts([Caption("a person walks"), Caption("turn left")])):
+    judge = embedder()
+    for points in (judge.motions(motions), judge.texts([Caption("a person walks"), Caption("turn left")])):
         assert points.dtype == np.float64
         assert np.linalg.norm(points, axis=1) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_motion_stands_alone(motions: list[np.ndarray]) -> None:
     """Neither the rows beside it nor the padding behind it nor its place in the list matters."""
-    made = embedder()
-    together = made.motions(motions)
-    alone = np.concatenate([made.motions([one]) for one in motions])
+    judge = embedder()
+    together = judge.motions(motions)
+    alone = np.concatenate([judge.motions([one]) for one in motions])
     assert together == pytest.approx(alone, abs=1e-5)
-    assert made.motions(motions[::-1])[::-1] == pytest.approx(together, abs=1e-5)
+    assert judge.motions(motions[::-1])[::-1] == pytest.approx(together, abs=1e-5)
     assert np.abs(together[0] - together[1]).max() > 1e-3
 
 
 def test_a_sentence_stands_alone() -> None:
     """A longer sentence in the same call changes nothing."""
-    made = embedder()
-    assert made.texts([Caption("walk"), Caption("a person turns left . a person walks")])[:1] == pytest.approx(
-        made.texts([Caption("walk")]), abs=1e-5
+    judge = embedder()
+    assert judge.texts([Caption("walk"), Caption("a person turns left . a person walks")])[:1] == pytest.approx(
+        judge.texts([Caption("walk")]), abs=1e-5
     )
 
 
 def test_only_what_is_seen_is_read(motions: list[np.ndarray]) -> None:
     """Rotations, stored velocities and contact flags are ignored; the root and the places are not."""
-    made, walk = embedder(), motions[0]
-    hidden, seen = walk.copy(), walk.copy()
+    judge, walk = embedder(), motions[0]
+    hidden, visible = walk.copy(), walk.copy()
     hidden[:, LAYOUT["ric"].stop :] += 3.0
-    seen[:, LAYOUT["ric"]] += 0.3
-    assert np.array_equal(made.motions([hidden]), made.motions([walk]))
-    assert np.abs(made.motions([seen]) - made.motions([walk])).max() > 1e-3
+    visible[:, LAYOUT["ric"]] += 0.3
+    assert np.array_equal(judge.motions([hidden]), judge.motions([walk]))
+    assert np.abs(judge.motions([visible]) - judge.motions([walk])).max() > 1e-3
 
 
 def test_inputs_are_places_displacements_and_the_way(motions: list[np.ndarray]) -> None:
     """Displacements equal the published velocity block, the way is that of the decoded pelvis; ends repeat."""
     walk = motions[2].astype(np.float64)
     padded = np.concatenate([walk, np.zeros((9, 263))])
-    got = inputs(torch.from_numpy(padded)[None], torch.tensor([len(walk)]))[0, : len(walk)].numpy()
-    assert np.array_equal(got[:, :67], walk[:, :67])
-    assert got[:-1, 67:133] == pytest.approx(walk[:-1, LAYOUT["joint_velocity"]], abs=1e-5)
-    assert np.array_equal(got[-1, 67:133], got[-2, 67:133])
+    values = inputs(torch.from_numpy(padded)[None], torch.tensor([len(walk)]))[0, : len(walk)].numpy()
+    assert np.array_equal(values[:, :67], walk[:, :67])
+    assert values[:-1, 67:133] == pytest.approx(walk[:-1, LAYOUT["joint_velocity"]], abs=1e-5)
+    assert np.array_equal(values[-1, 67:133], values[-2, 67:133])
     pelvis = hml.decode_positions(walk)[:, 0]
-    assert got[:, 135:] == pytest.approx(pelvis[:, [0, 2]], abs=1e-9)
+    assert values[:, 135:] == pytest.approx(pelvis[:, [0, 2]], abs=1e-9)
     heading = 2 * np.arctan2(*hml.recover_root(walk)[0][:, [2, 0]].T)
-    assert got[:, 133] == pytest.approx(np.cos(heading), abs=1e-9)
-    assert got[:, 134] == pytest.approx(np.sin(heading), abs=1e-9)
+    assert values[:, 133] == pytest.approx(np.cos(heading), abs=1e-9)
+    assert values[:, 134] == pytest.approx(np.sin(heading), abs=1e-9)
 
 
 @pytest.mark.parametrize("bad", ["nan", "short", "width", "empty"])
@@ -119,13 +119,13 @@ def test_nonsense_stays_finite(motions: list[np.ndarray]) -> None:
 
 def test_a_file_gives_the_evaluator_back(tmp_path: Path, motions: list[np.ndarray]) -> None:
     """To the precision of float16; statistics and card exactly."""
-    made = embedder()
-    back = load_embedder(save_embedder(made, tmp_path / "a.safetensors"), tiny.text())
+    judge = embedder()
+    back = load_embedder(save_embedder(judge, tmp_path / "a.safetensors"), tiny.text())
     assert is_embedder(tmp_path / "a.safetensors")
-    assert back.card == made.card
-    assert torch.equal(back.mean, made.mean)
-    assert back.motions(motions) == pytest.approx(made.motions(motions), abs=5e-3)
-    assert back.texts([Caption("a person walks")]) == pytest.approx(made.texts([Caption("a person walks")]), abs=5e-3)
+    assert back.card == judge.card
+    assert torch.equal(back.mean, judge.mean)
+    assert back.motions(motions) == pytest.approx(judge.motions(motions), abs=5e-3)
+    assert back.texts([Caption("a person walks")]) == pytest.approx(judge.texts([Caption("a person walks")]), abs=5e-3)
 
 
 def test_another_text_encoder_is_refused(tmp_path: Path) -> None:

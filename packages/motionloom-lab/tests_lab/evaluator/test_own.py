@@ -86,9 +86,9 @@ def test_captions_are_handed_on_for_the_share_that_is_asked() -> None:
     """None at 0, each at 1, ten of forty at a quarter; the captions stay the same ones."""
     rng = np.random.default_rng(0)
     for share, moved in ((0.0, 0), (0.25, 10), (1.0, 40)):
-        got = own._handed_on(np.arange(40), share, rng)
-        assert (got != np.arange(40)).sum() == moved
-        assert sorted(got) == list(range(40))
+        order = own._handed_on(np.arange(40), share, rng)
+        assert (order != np.arange(40)).sum() == moved
+        assert sorted(order) == list(range(40))
 
 
 def test_a_response_is_monotone_within_its_intervals() -> None:
@@ -136,9 +136,9 @@ def test_the_chance_of_a_right_order_is_counted_within_prompts() -> None:
     prompts, obeyed = np.array([0, 0, 0, 1, 1, 2]), np.array([True, False, False, True, False, True])
     far = np.full((6, 3), 5.0)
     far[np.arange(6), prompts] = own_distance
-    found = within_prompts([Scored(prompts, obeyed, far)])
-    assert found.mean == pytest.approx(2.5 / 3)
-    assert found.count == 2
+    chance = within_prompts([Scored(prompts, obeyed, far)])
+    assert chance.mean == pytest.approx(2.5 / 3)
+    assert chance.count == 2
     assert np.isnan(within_prompts([Scored(prompts[:1], obeyed[:1], far[:1])]).mean)
 
 
@@ -183,17 +183,17 @@ def test_the_shipped_evaluator_knows_made_up_people() -> None:
     """Walking ahead, standing, and a circle to the left lie nearest to their own words; so does the film run back."""
     walk, stand = features(people.walking(1.2, 5.0)), features(people.standing(5.0))
     shown = [walk, stand, own.reverse(walk, np.random.default_rng(0))]
-    said = ["a person walks forward", "a person stands still", "a person walks backward"]
+    sentences = ["a person walks forward", "a person stands still", "a person walks backward"]
     evaluator = load_evaluator("own")
-    texts, motions = evaluator.texts([Caption(text) for text in said]), evaluator.motions(shown)
+    texts, motions = evaluator.texts([Caption(text) for text in sentences]), evaluator.motions(shown)
     assert np.linalg.norm(texts[:, None] - motions[None], axis=-1).argmin(1).tolist() == [0, 1, 2]
     assert np.linalg.norm(motions, axis=1) == pytest.approx(1.0, abs=1e-5)
 
 
 def test_turns_are_measured_and_not_named_by_captions() -> None:
     """Actions that name a side have no wordings of their own."""
-    shown = features(people.walking(1.0, 5.0))
+    turn = features(people.walking(1.0, 5.0))
     notes = (Note(0, 80, "action:walk turn right", ("she turns right",)), Note(0, 60, "turn left"), Note(0, 60, "walk"))
-    held = own.held_out([Clip("one", "cmu", "free", "val", "plain", notes, shown)])
+    held = own.held_out([Clip("one", "cmu", "free", "val", "plain", notes, turn)])
     assert len(held.turns) == 1
     assert "left" in held.turns[0][1]

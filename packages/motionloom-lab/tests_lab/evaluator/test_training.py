@@ -39,17 +39,17 @@ def test_each_row_is_held_against_what_is_allowed_and_its_own_contrary() -> None
     """Products by hand: -inf where a pair is no negative, the own pair always in, the contrary in the last column."""
     ask, answer = torch.eye(3)[:, :2] * 2 + 1, torch.tensor([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     allowed = torch.tensor([[False, True, False], [True, False, True], [False, False, False]])
-    found = contrast(ask, answer, torch.tensor([[5.0, 7.0]]), torch.tensor([1]), allowed)
+    products = contrast(ask, answer, torch.tensor([[5.0, 7.0]]), torch.tensor([1]), allowed)
     low = float("-inf")
     expected = [[3, 1, low, low], [1, 3, 4, 1 * 5 + 3 * 7], [low, low, 2, low]]
-    assert torch.equal(found, torch.tensor(expected))
+    assert torch.equal(products, torch.tensor(expected))
 
 
 def test_forbidden_pairs_leave_finite_gradients() -> None:
     """Also for what scales the products."""
     scale, points = torch.tensor(2.0, requires_grad=True), torch.randn(4, 3, requires_grad=True)
-    found = contrast(points * scale, points, points[:1], torch.tensor([2]), torch.zeros(4, 4, dtype=torch.bool))
-    F.cross_entropy(found, torch.arange(4)).backward()
+    products = contrast(points * scale, points, points[:1], torch.tensor([2]), torch.zeros(4, 4, dtype=torch.bool))
+    F.cross_entropy(products, torch.arange(4)).backward()
     assert scale.grad is not None
     assert bool(scale.grad.isfinite())
     assert points.grad is not None
@@ -73,24 +73,24 @@ def batch_of(texts: list[int], groups: list[int], takes: list[int]) -> PairBatch
 
 def test_the_same_action_in_other_words_is_no_negative() -> None:
     """Same label, same recording, alike sentences are not; opposite directions are, however alike they read."""
-    said = ["turns left", "turns right", "waves", "waves a hand"]
+    sentences = ["turns left", "turns right", "waves", "waves a hand"]
     pooled = torch.tensor([[1.0, 0.1], [1.0, 0.0], [0.0, 1.0], [0.1, 1.0]])
-    found = negatives(batch_of([0, 1, 2, 3], [-1, -2, -3, -4], [0, 1, 2, 3]), pooled, senses(said))
-    assert found.tolist() == [
+    allowed = negatives(batch_of([0, 1, 2, 3], [-1, -2, -3, -4], [0, 1, 2, 3]), pooled, senses(sentences))
+    assert allowed.tolist() == [
         [False, True, True, True],
         [True, False, True, True],
         [True, True, False, False],
         [True, True, False, False],
     ]
-    labelled = negatives(batch_of([0, 2, 1], [7, 7, -1], [0, 1, 1]), pooled, senses(said))
+    labelled = negatives(batch_of([0, 2, 1], [7, 7, -1], [0, 1, 1]), pooled, senses(sentences))
     assert labelled.tolist() == [[False, False, True], [False, False, False], [True, False, False]]
 
 
 def test_opposite_directions_are_told_from_both_and_from_none() -> None:
     """Left against right, forward against backward; a sentence that names both opposes nothing."""
-    said = ["steps left", "steps right", "left then right", "walks forward", "walks backwards", "waves"]
-    found = opposed(senses(said), senses(said)).tolist()
-    pairs = {(i, j) for i in range(6) for j in range(6) if found[i][j]}
+    sentences = ["steps left", "steps right", "left then right", "walks forward", "walks backwards", "waves"]
+    opposite = opposed(senses(sentences), senses(sentences)).tolist()
+    pairs = {(i, j) for i in range(6) for j in range(6) if opposite[i][j]}
     assert pairs == {(0, 1), (1, 0), (3, 4), (4, 3)}
 
 
@@ -129,8 +129,8 @@ def test_a_batch_follows_from_seed_and_step(data: Path) -> None:
     assert len(first.hard_motion) == 3  # a third: every sentence here walks
     for row, number in enumerate(first.hard_motion.tolist()):
         length = int(first.lengths[8 + row])
-        shown = first.features[8 + row, :length].numpy()
-        assert np.allclose(shown, backwards(first.features[number, : length + 1].numpy()), atol=1e-6)
+        motion = first.features[8 + row, :length].numpy()
+        assert np.allclose(motion, backwards(first.features[number, : length + 1].numpy()), atol=1e-6)
 
 
 def test_a_stopped_run_goes_on_with_the_same_losses(data: Path, tmp_path: Path) -> None:
@@ -139,9 +139,9 @@ def test_a_stopped_run_goes_on_with_the_same_losses(data: Path, tmp_path: Path) 
     for stop in (3, None):
         parts = train_evaluator(Training(recipe(), tmp_path / "b", "cpu", stop, lambda line: None), data, tiny.text())
     assert whole.read_bytes() == parts.read_bytes()
-    made = load_embedder(whole, tiny.text())
-    assert made.card["licence"] == "free"
-    assert made.texts([Caption("a person walks")]).shape == (1, 128)
+    judge = load_embedder(whole, tiny.text())
+    assert judge.card["licence"] == "free"
+    assert judge.texts([Caption("a person walks")]).shape == (1, 128)
 
 
 @pytest.mark.parametrize("net", [{"patch": 4, "text": TEXT}, {"text": 384}, {"width": 30, "text": TEXT}])
@@ -172,8 +172,8 @@ def test_the_commands_train_an_evaluator_and_refuse_what_they_cannot_measure(
     monkeypatch.chdir(tmp_path)
     Path("recipe.toml").write_text(RECIPE)
     save_prior(tiny.prior(), "tiny.safetensors")
-    said = ["--recipe", "recipe.toml", "--data", str(data), "--out", "run", "--text", "tiny.safetensors"]
-    assert main(["train", "evaluator", *said, "--device", "cpu"]) == 0
+    arguments = ["--recipe", "recipe.toml", "--data", str(data), "--out", "run", "--text", "tiny.safetensors"]
+    assert main(["train", "evaluator", *arguments, "--device", "cpu"]) == 0
     assert load_embedder(Path("run/mine.safetensors"), tiny.text()).card["name"] == "mine"
     capsys.readouterr()
     assert main(["evaluate", "evaluator", "--data", str(data), "--evaluator", "run/mine.safetensors"]) == 2

@@ -71,8 +71,8 @@ def reference(folder: Path) -> None:
     from motionloom_lab.suites.protocol import Selection
     from tests_lab.suites.judged import Judge, item
 
-    made = text_reference.measure([item(k, 40 + k) for k in range(5)], Judge(), Selection())
-    text_reference.save(made, folder / "a.safetensors")
+    value = text_reference.measure([item(k, 40 + k) for k in range(5)], Judge(), Selection())
+    text_reference.save(value, folder / "a.safetensors")
 
 
 def read_reference(folder: Path) -> object:

@@ -11,7 +11,7 @@ SMALL = pr.Limbs(((0, 1), (1, 2), (1, 3)), ((0, 1), (0, 2)))
 SIZES = st.tuples(st.integers(0, 2**31), st.integers(1, 5), st.integers(4, 7), st.integers(4, 6), st.integers(1, 4))
 
 
-def drawn(seed: int, samples: int, frames: int, joints: int, futures: int) -> tuple[np.ndarray, ...]:
+def random_window(seed: int, samples: int, frames: int, joints: int, futures: int) -> tuple[np.ndarray, ...]:
     """Samples, truth, futures (the truth first) and three frames of past."""
     rng = np.random.default_rng(seed)
     y = rng.normal(size=(futures, frames, joints, 3))

@@ -72,9 +72,9 @@ def test_a_folded_person_has_a_low_head_and_a_pelvis_that_nobody_has() -> None:
             "head": (140, 160),
         }.items()
     }
-    found = suite.judge([np.repeat(DRAWN, 40, axis=0)], reach)["numbers"]
-    assert not any(found[name]["passes"] for name in ("pelvis", "head", "whole"))
-    assert found["pelvis"]["outside"] == 1.0
+    numbers = suite.judge([np.repeat(DRAWN, 40, axis=0)], reach)["numbers"]
+    assert not any(numbers[name]["passes"] for name in ("pelvis", "head", "whole"))
+    assert numbers["pelvis"]["outside"] == 1.0
     sound = suite.judge([PERSON], reach)["numbers"]
     assert all(sound[name]["passes"] for name in ("pelvis", "head", "whole", "bones"))
 
@@ -104,6 +104,6 @@ def test_shipped_percentiles_are_of_all_numbers_and_in_order() -> None:
 
 
 def test_a_table_has_a_row_for_each_number() -> None:
-    found = suite.judge([PERSON], suite.known())
-    assert [row[0] for row in suite.table(found)] == ["body", *found["numbers"]]
-    assert found["of"] == len(found["numbers"]) == 8
+    answer = suite.judge([PERSON], suite.known())
+    assert [row[0] for row in suite.table(answer)] == ["body", *answer["numbers"]]
+    assert answer["of"] == len(answer["numbers"]) == 8

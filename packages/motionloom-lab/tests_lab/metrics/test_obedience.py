@@ -78,4 +78,4 @@ def test_the_weights_that_ship_know_most_of_the_prompts() -> None:
     prior = Prior.load("default")
     assert prior.known is not None
     prompts = [check.prompt for check in CHECKS]
-    assert sum(found.near for found in nearest(prior.known, prompts, prior.text)) >= 0.9 * len(prompts)
+    assert sum(match.near for match in nearest(prior.known, prompts, prior.text)) >= 0.9 * len(prompts)

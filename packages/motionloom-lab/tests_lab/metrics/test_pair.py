@@ -57,11 +57,11 @@ def test_completion_errors_equal_a_loop_over_people_and_frames():
 def test_a_partner_who_walks_away_gives_horizons_in_closed_form():
     real, predicted = couple(), couple()
     predicted[1, :, :, 0] += np.maximum(np.arange(80) - 19, 0)[:, None] * 0.01  # 1 cm per frame from frame 20 on
-    found = mp.completion_errors(real, predicted)
+    horizons = mp.completion_errors(real, predicted)
     expected = [0.01 * (20 * k + 1) / 2 / 2 for k in (1, 2, 3)]  # mean of 1..20k cm, over two people
-    np.testing.assert_allclose([e.root for e in found], expected)
-    np.testing.assert_allclose([e.absolute for e in found], expected)
-    np.testing.assert_allclose([e.joint for e in found], 0, atol=1e-12)
+    np.testing.assert_allclose([e.root for e in horizons], expected)
+    np.testing.assert_allclose([e.absolute for e in horizons], expected)
+    np.testing.assert_allclose([e.joint for e in horizons], 0, atol=1e-12)
 
 
 def test_errors_in_the_prefix_and_beyond_the_horizon_do_not_count():
@@ -169,19 +169,19 @@ def test_the_nearest_points_of_segments_equal_a_fine_search():
     share = np.linspace(0, 1, 201)
     on = [e[:, None, 0] + share[:, None] * (e[:, None, 1] - e[:, None, 0]) for e in (a, b)]
     searched = np.linalg.norm(on[0][:, :, None] - on[1][:, None], axis=-1).min(axis=(1, 2))
-    found = capsules.closest(a, b)[2]
-    assert (found <= searched + 1e-9).all()
-    np.testing.assert_allclose(found, searched, atol=0.02)
+    distance = capsules.closest(a, b)[2]
+    assert (distance <= searched + 1e-9).all()
+    np.testing.assert_allclose(distance, searched, atol=0.02)
 
 
 def test_the_capsules_of_limbs_have_the_radii_of_the_drawn_figure():
     still = Motion(SMPL22, 20.0, SMPL22.offsets[:1].repeat(2, 0), np.tile(rot.IDENTITY, (2, 22, 1)))
-    drawn = figure(still)
-    radii = {bone: r for bone, r in zip(drawn.bones, drawn.radii, strict=True) if bone[1] not in drawn.trunk}
-    found = {(c[0][0][0], c[1][0][0]): c[2:] for c in capsules.CAPSULES if len(c[0]) == 1 and len(c[1]) == 1}
-    assert set(radii) <= set(found)
+    shape = figure(still)
+    radii = {bone: r for bone, r in zip(shape.bones, shape.radii, strict=True) if bone[1] not in shape.trunk}
+    numbers = {(c[0][0][0], c[1][0][0]): c[2:] for c in capsules.CAPSULES if len(c[0]) == 1 and len(c[1]) == 1}
+    assert set(radii) <= set(numbers)
     for bone, expected in radii.items():
-        np.testing.assert_allclose(found[bone], expected, atol=1e-3)
+        np.testing.assert_allclose(numbers[bone], expected, atol=1e-3)
 
 
 def test_every_capsule_end_is_a_place_of_the_body():
@@ -238,7 +238,7 @@ def quarters() -> np.ndarray:
 
 
 def test_the_numbers_of_a_duet_are_means_over_its_frames_and_people():
-    found, far = mp.pair_stats(quarters()), mp.hand_distance(quarters())[40:]
+    numbers, far = mp.pair_stats(quarters()), mp.hand_distance(quarters())[40:]
     expected = {
         "distance": 1.5,
         "distance_range": 0.5,
@@ -249,18 +249,18 @@ def test_the_numbers_of_a_duet_are_means_over_its_frames_and_people():
         "touch": 0.25,
         "hand_distance": (0.05 + 0.2) / 4 + far.mean() / 2,
     }
-    assert {name: found[name] for name in expected} == pytest.approx(expected, abs=1e-9)
+    assert {name: numbers[name] for name in expected} == pytest.approx(expected, abs=1e-9)
 
 
 def test_what_groups_compare_are_the_same_numbers_frame_by_frame():
     pair = quarters()
     pair[1, :, :, 0] += np.linspace(0, 0.04, 80)[:, None]
     pair[:, 60:] = couple(0.1)[:, 60:]
-    found = mp.pair_stats(pair)
-    assert found["penetration"] > 0
-    assert found["hand_contact"] == 0.75
+    numbers = mp.pair_stats(pair)
+    assert numbers["penetration"] > 0
+    assert numbers["hand_contact"] == 0.75
     means = {name: series(pair).mean() for name, series in groups.SERIES.items()}
-    assert means == pytest.approx({name: found[name] for name in groups.SERIES})
+    assert means == pytest.approx({name: numbers[name] for name in groups.SERIES})
 
 
 def test_speeds_and_skate_are_measured_at_the_rate_of_the_frames_and_of_both_people():
@@ -268,13 +268,13 @@ def test_speeds_and_skate_are_measured_at_the_rate_of_the_frames_and_of_both_peo
     first, second = people.walking(0.7, 3.0, fps=30.0), people.standing(3.0, fps=30.0)
     ways = np.cumsum(rng.normal(0, 0.03, (2, 90, 3)) * [1, 0, 1], axis=1)
     pair = np.stack([people.moved(first, ways[0]), people.moved(second, ways[1])])
-    found, feet = mp.pair_stats(pair, fps=30.0), [skate(person, 30.0) for person in pair]
+    numbers, feet = mp.pair_stats(pair, fps=30.0), [skate(person, 30.0) for person in pair]
     for name in ("share", "speed", "slide"):
         a, b = (getattr(one, name) for one in feet)
         assert abs(a - b) > 1e-3
-        assert found[f"skate_{name}"] == pytest.approx((a + b) / 2)
-    assert found["synchrony"] == pytest.approx(mp.synchrony(pair, 30.0))
-    assert found["speed_synchrony"] == pytest.approx(mp.speed_synchrony(pair, 30.0))
+        assert numbers[f"skate_{name}"] == pytest.approx((a + b) / 2)
+    assert numbers["synchrony"] == pytest.approx(mp.synchrony(pair, 30.0))
+    assert numbers["speed_synchrony"] == pytest.approx(mp.speed_synchrony(pair, 30.0))
     assert len({round(f(pair, fps), 6) for f in (mp.synchrony, mp.speed_synchrony) for fps in (20.0, 30.0)}) == 4
 
 
@@ -286,10 +286,10 @@ def test_a_capsule_is_as_thick_as_told_at_either_end():
 
 
 def test_the_frame_of_the_first_person_is_where_he_begins_and_faces():
-    found = mp.in_first_frame(rigid(couple(1.5, turn=1.0), 2.2, (5.0, 0.3, -3.0)))
+    places = mp.in_first_frame(rigid(couple(1.5, turn=1.0), 2.2, (5.0, 0.3, -3.0)))
     height = couple()[0, 0, 0, 1] + 0.3
-    np.testing.assert_allclose(found[:, 0, 0], [[0, height, 0], [0, height, 1.5]], atol=1e-9)
-    np.testing.assert_allclose([ph.heading(person)[0] for person in found], [0.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(places[:, 0, 0], [[0, height, 0], [0, height, 1.5]], atol=1e-9)
+    np.testing.assert_allclose([ph.heading(person)[0] for person in places], [0.0, 1.0], atol=1e-9)
 
 
 # Groups --------------------------------------------------------------------------------------------------------------
@@ -308,11 +308,11 @@ def test_the_ratio_is_the_shift_of_a_group_over_that_of_real_recordings():
     # of the rest of 0.9, 1.0, 1.1: 0.15 = mean(0.1, 0.2), 0.1, 0.15
     spread = (0.15 + 0.1 + 0.15) / 3
     for apart, away in ((1.0, 0.2 / 3), (1.3, 0.3), (0.7, 0.3)):
-        found = groups.compare([couple(apart, seconds=1.0)], real, names=("distance",))["distance"]
-        assert (found.spread, found.away) == pytest.approx((spread, away), rel=0.02)
-        assert (found.group, found.real) == pytest.approx((apart, 1.0))
-        assert found.within() == (apart == 1.0)
-        assert found.within(2.5)
+        ratio = groups.compare([couple(apart, seconds=1.0)], real, names=("distance",))["distance"]
+        assert (ratio.spread, ratio.away) == pytest.approx((spread, away), rel=0.02)
+        assert (ratio.group, ratio.real) == pytest.approx((apart, 1.0))
+        assert ratio.within() == (apart == 1.0)
+        assert ratio.within(2.5)
 
 
 def test_a_group_of_no_spread_is_equal_or_infinitely_far():
@@ -348,10 +348,10 @@ def test_true_partners_of_a_common_path_are_told_from_shuffled_ones():
     stand = people.standing(6.0)
     paths = [0.05 * np.random.default_rng(n).standard_normal((120, 3)).cumsum(axis=0) * [1, 0, 1] for n in range(5)]
     pairs = [np.stack([people.moved(stand, p), people.moved(stand, p + np.array([1.0, 0, 0]))]) for p in paths]
-    found = groups.synchrony_against_shuffled(pairs)
-    assert found.partners == pytest.approx(1)
-    assert abs(found.strangers) < 0.3
-    assert found.size > 3
+    numbers = groups.synchrony_against_shuffled(pairs)
+    assert numbers.partners == pytest.approx(1)
+    assert abs(numbers.strangers) < 0.3
+    assert numbers.size > 3
 
 
 def test_strangers_are_everybody_with_everybody_else_where_they_were_recorded():
@@ -364,14 +364,14 @@ def test_strangers_are_everybody_with_everybody_else_where_they_were_recorded():
     def measure(a: float, b: float) -> float:
         return float(a + 10 * a * b + b**2)
 
-    found = groups.synchrony_against_shuffled(pairs, of=of, fps=7.0)
+    numbers = groups.synchrony_against_shuffled(pairs, of=of, fps=7.0)
     origin = couple()[:, 0, 0, 0]
     places = [(origin[0] + p, origin[1] + p) for p in (0.0, 1.0, 3.0)]
     own = [measure(a, b) + 7 for a, b in places]
     others = [measure(a, b) + 7 for n, (a, _) in enumerate(places) for m, (_, b) in enumerate(places) if m != n]
-    assert found.partners == pytest.approx(np.mean(own))
-    assert found.strangers == pytest.approx(np.mean(others))
-    assert found.size == pytest.approx((np.mean(own) - np.mean(others)) / np.std(others))
+    assert numbers.partners == pytest.approx(np.mean(own))
+    assert numbers.strangers == pytest.approx(np.mean(others))
+    assert numbers.size == pytest.approx((np.mean(own) - np.mean(others)) / np.std(others))
 
 
 def test_quantiles_are_read_evenly_and_within_is_at_most_one_and_a_half_times():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom_lab.metrics import prediction as pr
-from tests_lab.metrics.futures import SIZES, SMALL, drawn, pose_distance
+from tests_lab.metrics.futures import SIZES, SMALL, pose_distance, random_window
 
 # ---- written out
 
@@ -45,7 +45,7 @@ def naive(samples: np.ndarray, truth: np.ndarray, futures: np.ndarray) -> dict[s
 @given(SIZES)
 def test_distances_are_the_written_out_ones(size: tuple[int, ...]) -> None:
     """Loops over samples, futures, frames and numbers."""
-    samples, truth, futures, _ = drawn(*size)
+    samples, truth, futures, _ = random_window(*size)
     scores = pr.score_window(samples, truth, futures, fps=30)
     assert pr.apd(samples) == scores.numbers["apd"]
     assert pr.ade(samples, truth) == scores.numbers["ade"]
@@ -58,8 +58,8 @@ def test_distances_are_the_written_out_ones(size: tuple[int, ...]) -> None:
 def test_similar_windows_are_all_nearer_ones_whatever_the_chunk(seed: int, n: int, chunk: int, limit: float) -> None:
     """Poses on a grid, so that many lie exactly at the threshold, which is not nearer; far from the origin."""
     poses = np.random.default_rng(seed).integers(0, 4, (n, 3)) * 0.25 + 100.0
-    found = pr.similar_windows(poses, limit, chunk=chunk)
-    for i, numbers in enumerate(found):
+    near = pr.similar_windows(poses, limit, chunk=chunk)
+    for i, numbers in enumerate(near):
         assert numbers.tolist() == [j for j in range(n) if j == i or pose_distance(poses[i], poses[j]) < limit]
 
 
@@ -124,7 +124,7 @@ def test_the_last_frame_and_the_mean_have_minima_of_their_own() -> None:
 @given(SIZES)
 def test_the_order_of_samples_futures_and_joints_does_not_matter(size: tuple[int, ...]) -> None:
     """All but the limbs, which name their joints, and for samples those too."""
-    samples, truth, futures, past = drawn(*size)
+    samples, truth, futures, past = random_window(*size)
     rng = np.random.default_rng(size[0])
     p, q, j = (rng.permutation(n) for n in (len(samples), len(futures), samples.shape[2]))
     one = pr.score_window(samples, truth, futures, fps=30, past=past, limbs=SMALL)
@@ -141,10 +141,10 @@ def assert_same(one: pr.WindowScores, two: pr.WindowScores) -> None:
 
 def test_chunks_do_not_change_the_answer_and_single_precision_hardly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows of futures and samples one at a time; nothing handed in is written to."""
-    samples, truth, futures, past = (x.astype(np.float32) for x in drawn(3, 7, 6, 5, 9))
-    kept = [x.copy() for x in (samples, truth, futures, past)]
+    samples, truth, futures, past = (x.astype(np.float32) for x in random_window(3, 7, 6, 5, 9))
+    copies = [x.copy() for x in (samples, truth, futures, past)]
     whole = pr.score_window(samples, truth, futures, fps=30, past=past, limbs=SMALL)
-    assert all((a == b).all() for a, b in zip(kept, (samples, truth, futures, past)))
+    assert all((a == b).all() for a, b in zip(copies, (samples, truth, futures, past)))
     monkeypatch.setattr(pr, "_CELLS", 20)
     assert_same(
         whole,
@@ -158,10 +158,10 @@ def test_similar_windows_of_six_thousand_poses_take_little_memory() -> None:
     """The square of distances would be 288 MB; a tenth of that is room enough."""
     poses = np.random.default_rng(0).normal(size=(6000, 48)).astype(np.float32)
     tracemalloc.start()
-    found = pr.similar_windows(poses, 0.5, chunk=64)
+    near = pr.similar_windows(poses, 0.5, chunk=64)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert len(found) == 6000
+    assert len(near) == 6000
     assert peak < 30e6
 
 
@@ -180,7 +180,7 @@ def test_a_window_takes_the_memory_of_its_samples_a_few_times() -> None:
 
 
 def scored(seed: int, futures: int) -> pr.WindowScores:
-    samples, truth, y, past = drawn(seed, 3, 5, 4, futures)
+    samples, truth, y, past = random_window(seed, 3, 5, 4, futures)
     return pr.score_window(samples, truth, y, fps=30, past=past if seed else None, limbs=SMALL)
 
 
@@ -200,8 +200,8 @@ def test_windows_of_one_future_count_as_the_option_says(singles: pr.Singles, all
     tally = pr.Tally(singles)
     for one in scores:
         tally.add(one, "walk")
-    found = tally.averages()
-    assert list(found) == list(pr.METRICS)
+    averages = tally.averages()
+    assert list(averages) == list(pr.METRICS)
     for name, n in {
         "ade": all_of,
         "apd": all_of,
@@ -213,21 +213,21 @@ def test_windows_of_one_future_count_as_the_option_says(singles: pr.Singles, all
         "seam_velocity": 2,
     }.items():
         measured = [s.numbers[name] for s in scores[3 - n :]]
-        assert found[name] == (pytest.approx(np.mean(measured)), n), name
+        assert averages[name] == (pytest.approx(np.mean(measured)), n), name
     real = {"walk": 0.0}
     assert tally.cmd.result(real) == pytest.approx(cmd_of(scores[3 - all_of :]).result(real))
 
 
 def test_what_cannot_be_told_is_absent() -> None:
     """No past, no limbs, no other futures: no seam, no body, no APDE, and the table has no such rows."""
-    samples, truth, _, _ = drawn(0, 3, 5, 4, 1)
+    samples, truth, _, _ = random_window(0, 3, 5, 4, 1)
     tally = pr.Tally()
     assert tally.averages() == {}
     tally.add(pr.score_window(samples, truth, fps=30))
-    found = tally.averages()
-    assert "apde" not in found
-    assert not any(name.startswith(("seam", "stretch", "jitter", "mae")) for name in found)
-    assert found["mmade"] == (pytest.approx(found["ade"].value), 1)
+    averages = tally.averages()
+    assert "apde" not in averages
+    assert not any(name.startswith(("seam", "stretch", "jitter", "mae")) for name in averages)
+    assert averages["mmade"] == (pytest.approx(averages["ade"].value), 1)
 
 
 def test_speeds_of_real_futures_are_references() -> None:

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics import prediction as pr
-from tests_lab.metrics.futures import SIZES, SMALL, drawn, pose_distance
+from tests_lab.metrics.futures import SIZES, SMALL, pose_distance, random_window
 
 
 @settings(max_examples=30, deadline=None)
 @given(SIZES)
 def test_limbs_are_measured_as_written_out(size: tuple[int, ...]) -> None:
     """Stretch, jitter and angles in loops over samples, limbs and frames."""
-    samples, truth, _, _ = drawn(*size)
+    samples, truth, _, _ = random_window(*size)
     shares, errors = [], []
     for sample in samples:
         for a, b in SMALL.pairs:
@@ -48,7 +48,7 @@ def bend(pose: np.ndarray, i: int, j: int) -> float:
 @given(SIZES, st.sampled_from([25.0, 30.0, 60.0]))
 def test_jerk_speeds_and_seams_are_the_written_out_ones(size: tuple[int, ...], fps: float) -> None:
     """Differences by their coefficients; a seam takes the largest that has frames on both sides."""
-    samples, _, _, past = drawn(*size)
+    samples, _, _, past = random_window(*size)
     third = [
         [np.linalg.norm(s[f + 3] - 3 * s[f + 2] + 3 * s[f + 1] - s[f], axis=-1) for f in range(len(s) - 3)]
         for s in samples
@@ -110,8 +110,8 @@ def test_a_limb_that_pulses_has_no_mean_stretch_but_jitter() -> None:
     one = np.zeros((4, 2, 3))
     one[:, 1, 0] = 1.0
     pulsing = one * np.array([0.9, 1.1, 0.9, 1.1])[:, None, None]
-    found = pr.stretch(pulsing[None], one, pr.Limbs(((0, 1),), ()))
-    assert found == pytest.approx((0.0, 10.0, 20.0, 20.0), abs=1e-9)
+    lengths = pr.stretch(pulsing[None], one, pr.Limbs(((0, 1),), ()))
+    assert lengths == pytest.approx((0.0, 10.0, 20.0, 20.0), abs=1e-9)
 
 
 def test_a_knee_bent_by_thirty_degrees_more_is_an_error_of_thirty_degrees_and_the_best_sample_counts() -> None:
@@ -145,8 +145,8 @@ def test_the_seam_of_a_polynomial_that_goes_on() -> None:
     clip = np.zeros((12, 2, 3))
     clip[:, 0, 1] = 3 * t + 1
     clip[:, 1, 2] = 2.0 * t**2
-    found = pr.seam(clip[:6], clip[None, 6:], 25)
-    assert found == pytest.approx((2 / 25, 4 / 25, 0.0, 0.0), abs=1e-9)
+    jump = pr.seam(clip[:6], clip[None, 6:], 25)
+    assert jump == pytest.approx((2 / 25, 4 / 25, 0.0, 0.0), abs=1e-9)
     clip[:, 1, 2] = t**3
     assert pr.seam(clip[:6], clip[None, 6:], 25).acceleration_worst == pytest.approx(6 / 25)
     jerk = pr.jerk(clip[None], 25)
@@ -158,7 +158,7 @@ def test_a_jump_at_the_seam_is_seen_also_one_frame_late(late: int) -> None:
     """10 cm from one frame to the next on one joint of two: 3 m/s at 30 fps, and three-fold in the third difference."""
     future = np.zeros((1, 6, 2, 3))
     future[0, late:, 1, 0] = 0.1
-    found = pr.seam(np.zeros((3, 2, 3)), future, 30)
-    assert found.velocity_worst == pytest.approx(3.0)
-    assert found.velocity == pytest.approx(1.5)
-    assert found.acceleration_worst == pytest.approx(0.1 * 900 * (2 - late))
+    jump = pr.seam(np.zeros((3, 2, 3)), future, 30)
+    assert jump.velocity_worst == pytest.approx(3.0)
+    assert jump.velocity == pytest.approx(1.5)
+    assert jump.acceleration_worst == pytest.approx(0.1 * 900 * (2 - late))

@@ -68,8 +68,8 @@ def test_skate_is_a_share_and_two_speeds() -> None:
     """0.7 m/s on toes 1.25 cm up: all frames, 70 cm/s, weighted by 2 - sqrt(2)."""
     p = moved(standing(), clock(standing())[:, 0] * [0, 0, 0.7] + [0, 0.0125, 0])
     row = realism.realism(p, FPS)
-    found = row["skate_ratio"], row["skate_speed"], row["skate_weighted"]
-    assert found == pytest.approx((1, 70, 70 * (2 - np.sqrt(2))))
+    numbers = row["skate_ratio"], row["skate_speed"], row["skate_weighted"]
+    assert numbers == pytest.approx((1, 70, 70 * (2 - np.sqrt(2))))
 
 
 def test_jerk_is_the_mean_and_its_peak_the_largest() -> None:

@@ -144,10 +144,10 @@ def test_diversity_of_random_pairs_is_that_of_the_cloud() -> None:
 
 def test_pairs_are_drawn_without_repetition(monkeypatch: pytest.MonkeyPatch) -> None:
     """With as many pairs as rows every row is drawn once on either side, and the sides are drawn apart."""
-    drawn: list[tuple[np.ndarray, np.ndarray]] = []
-    monkeypatch.setattr(retrieval, "diversity_of", lambda m, a, b: drawn.append((a, b)) or 0.0)
+    draws: list[tuple[np.ndarray, np.ndarray]] = []
+    monkeypatch.setattr(retrieval, "diversity_of", lambda m, a, b: draws.append((a, b)) or 0.0)
     retrieval.diversity(cloud(300, 2))
-    ((first, second),) = drawn
+    ((first, second),) = draws
     assert np.array_equal(np.sort(first), np.arange(300))
     assert np.array_equal(np.sort(second), np.arange(300))
     # met about once by chance: one side is not the other one moved along
@@ -166,8 +166,8 @@ def test_multimodality_compares_samples_of_one_caption_only() -> None:
 def test_multimodality_is_the_mean_written_out(seed: int) -> None:
     m = np.random.default_rng(seed).normal(size=(3, 6, 4))
     pairs = [(0, 5), (2, 2), (4, 1)]
-    found = np.mean([np.sqrt(np.sum((row[a] - row[b]) ** 2)) for row in m for a, b in pairs])
-    assert retrieval.multimodality_of(m, [a for a, _ in pairs], [b for _, b in pairs]) == pytest.approx(found)
+    mean = np.mean([np.sqrt(np.sum((row[a] - row[b]) ** 2)) for row in m for a, b in pairs])
+    assert retrieval.multimodality_of(m, [a for a, _ in pairs], [b for _, b in pairs]) == pytest.approx(mean)
 
 
 def test_draws_of_multimodality_reach_every_sample() -> None:

@@ -22,8 +22,8 @@ def feet(height: float, speed: float, *, side: float = 0.0, frames: int = 40) ->
 def test_a_body_dragged_along_the_floor() -> None:
     """1 m/s at 20 fps: every frame skates, 100 cm/s, 50 mm per frame."""
     p = standing()
-    found = skate(moved(p, clock(p)[:, 0] * [0.0, 0.0, 1.0]), FPS)
-    assert (found.share, found.speed, found.slide) == pytest.approx((1, 100, 50))
+    feet = skate(moved(p, clock(p)[:, 0] * [0.0, 0.0, 1.0]), FPS)
+    assert (feet.share, feet.speed, feet.slide) == pytest.approx((1, 100, 50))
 
 
 def test_both_horizontal_axes_count_and_the_height_does_not() -> None:
@@ -91,8 +91,8 @@ def test_the_last_frame_has_the_step_before_it() -> None:
 
 def test_planted_feet_do_not_skate() -> None:
     assert skate(standing(), FPS) == Skate(0, 0, 0)
-    found = skate(walking(1.0), FPS)
-    assert (found.share, found.speed) == pytest.approx((0, 0), abs=1e-9)
+    feet = skate(walking(1.0), FPS)
+    assert (feet.share, feet.speed) == pytest.approx((0, 0), abs=1e-9)
 
 
 def test_other_joints_do_not_matter() -> None:

@@ -36,10 +36,10 @@ variants = pytest.mark.parametrize("variant", sorted(VARIANTS))
 FRAMES = 18
 
 
-def talk_of(prior: NetConfig, *, fresh: bool = False, seed: int = 5, **given) -> Talk:
+def talk_of(prior: NetConfig, *, fresh: bool = False, seed: int = 5, **options) -> Talk:
     """A block; unless ``fresh`` it has much to say."""
     config = fitting(
-        prior, layers=given.pop("layers", 1), split=given.pop("split", None), aware=given.pop("aware", False)
+        prior, layers=options.pop("layers", 1), split=options.pop("split", None), aware=options.pop("aware", False)
     )
     torch.manual_seed(seed)
     talk = Talk(config, prior)
@@ -49,9 +49,9 @@ def talk_of(prior: NetConfig, *, fresh: bool = False, seed: int = 5, **given) ->
     return talk.eval()
 
 
-def net_of(variant: str, **given) -> PairNet:
+def net_of(variant: str, **options) -> PairNet:
     prior = tiny.prior(VARIANTS[variant])
-    talk = talk_of(VARIANTS[variant], **given)
+    talk = talk_of(VARIANTS[variant], **options)
     mean, std = torch.from_numpy(prior.mean), torch.from_numpy(prior.std)
     return PairNet(tiny_net(VARIANTS[variant]), talk, prior.schedule, mean=mean, std=std).eval()
 
@@ -147,18 +147,18 @@ def test_an_aware_block_sees_where_the_others_head_and_wrists_are():
     """Against the two motions decoded into one world by `features.pair`, each looked at from the other's root."""
     net = net_of("modulated", aware=True)
     bound, x = bound_of(net, 2), state_of(2)
-    stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.6, 0.8, 0.3, 2.0]])
+    poses = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.6, 0.8, 0.3, 2.0]])
     base, mean, std, _ = net._base
     inner = base.through(base.enter(x[:, 1:], 1, bound), bound, slice(2))
     signal, noise = net.schedule.at(1)
     trust = signal * 0.49 / (0.49 * signal**2 + noise**2)
-    places, signals = net.talk.config.places.encode(stands) / trust, torch.full((2,), float(signal))
+    places, signals = net.talk.config.places.encode(poses) / trust, torch.full((2,), float(signal))
     partner = net._other_seen(inner, bound, places, signals, None, FRAMES)
     assert partner.shape == (2, 5, 4 * 13)
     partner = partner.reshape(2, 20, 13)
     assert not partner[:, FRAMES:].any()
     guess = base(x[:, 1:], 1, bound) * std + mean
-    world, way = decode(guess, stands), compose(stands[:, None], along(guess))
+    world, way = decode(guess, poses), compose(poses[:, None], along(guess))
     for me, him in ((0, 1), (1, 0)):
         places = from_world(world[him], way[me][:, None])
         expected = torch.cat([relative(way[me], way[him]), places[:, [15, 20, 21]].flatten(1)], dim=-1)
@@ -212,11 +212,11 @@ def test_guidance_and_known_numbers_compose_in_the_one_loop(variant):
         cond = prior.condition(["the cat sat"] * 4)
         bound, null = ([part[rows] for part in net.bind(one)] for one in (cond, cond.null()))
         draw = row_noise([[10, 11, 12, 13][row] for row in rows])
-        given, held = known[rows], mask[rows]
-        hold = observe(given, held, prior.schedule, draw)
-        denoise = inpaint(guide(net, arrays_of(*bound), arrays_of(*null), 2.5), given, held)
+        options, held = known[rows], mask[rows]
+        hold = observe(options, held, prior.schedule, draw)
+        denoise = inpaint(guide(net, arrays_of(*bound), arrays_of(*null), 2.5), options, held)
         way = levels(prior.schedule, 5)
-        x = hold(draw(given), 50)
+        x = hold(draw(options), 50)
         return run(denoise, x, levels=way, solver=DDPM, schedule=prior.schedule, noise=draw, constrain=hold)
 
     whole = sample([0, 1, 2, 3])
@@ -278,9 +278,9 @@ def test_other_blocks_that_do_not_fit():
 # The file
 
 
-def block_of(variant: str, **given) -> tuple[PairBlock, object]:
+def block_of(variant: str, **options) -> tuple[PairBlock, object]:
     prior = tiny.prior(VARIANTS[variant])
-    talk = talk_of(VARIANTS[variant], **given)
+    talk = talk_of(VARIANTS[variant], **options)
     graph = pair_graph(talk.config, prior.net.config)
     about = ("tiny", fingerprint(prior.net), "free", "two people", {"n": 1})
     return PairBlock("dance", talk.config, arrays(talk), *about, graph=graph), prior
@@ -288,15 +288,15 @@ def block_of(variant: str, **given) -> tuple[PairBlock, object]:
 
 @variants
 def test_a_block_comes_back_from_its_file(variant, tmp_path):
-    made, prior = block_of(variant, aware=True, layers=2)
-    back = PairBlock.load(made.save(tmp_path / "a.safetensors", half=False), prior)  # type: ignore[arg-type]
-    assert (back.name, back.config, back.licence, back.notes) == ("dance", made.config, "free", {"n": 1})
+    block, prior = block_of(variant, aware=True, layers=2)
+    back = PairBlock.load(block.save(tmp_path / "a.safetensors", half=False), prior)  # type: ignore[arg-type]
+    assert (back.name, back.config, back.licence, back.notes) == ("dance", block.config, "free", {"n": 1})
     x, net = state_of(2).numpy(), back.net(prior)  # type: ignore[arg-type]
     bound = net.bind(prior.condition(["a person walks", ""]))  # type: ignore[attr-defined]
-    np.testing.assert_array_equal(net(x, 5, bound), made.net(prior)(x, 5, bound))  # type: ignore[arg-type]
-    small = PairBlock.load(made.save(tmp_path / "b.safetensors"), prior)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(net(x, 5, bound), block.net(prior)(x, 5, bound))  # type: ignore[arg-type]
+    small = PairBlock.load(block.save(tmp_path / "b.safetensors"), prior)  # type: ignore[arg-type]
     np.testing.assert_allclose(small.net(prior)(x, 5, bound), net(x, 5, bound), rtol=0, atol=0.05)  # type: ignore[arg-type]
-    sizes = [(tmp_path / name).stat().st_size - len(made.graph) for name in ("a.safetensors", "b.safetensors")]
+    sizes = [(tmp_path / name).stat().st_size - len(block.graph) for name in ("a.safetensors", "b.safetensors")]
     assert sizes[1] < 0.6 * sizes[0]
 
 
@@ -308,20 +308,20 @@ def test_a_block_of_the_default_prior_is_a_few_megabytes():
 
 
 def test_another_priors_block_is_refused(tmp_path):
-    made, _ = block_of("modulated")
-    path = made.save(tmp_path / "a.safetensors")
+    block, _ = block_of("modulated")
+    path = block.save(tmp_path / "a.safetensors")
     with pytest.raises(MotionloomError, match="belongs to the weights 'tiny'"):
         PairBlock.load(path, tiny.prior(seed=3))
 
 
 def test_hostile_files_are_refused(tmp_path, monkeypatch):
-    made, prior = block_of("modulated")
-    path = made.save(tmp_path / "a.safetensors")
+    block, prior = block_of("modulated")
+    path = block.save(tmp_path / "a.safetensors")
     assert path.is_file()
-    about = {"format": 1, "name": "a", "base": "b", "fingerprint": made.fingerprint, "licence": "c", "data": "d"}
+    about = {"format": 1, "name": "a", "base": "b", "fingerprint": block.fingerprint, "licence": "c", "data": "d"}
     sizes = {"width": 32, "heads": 2, "hidden": 48, "split": 2}
-    good = {k: v.copy() for k, v in made.tensors.items()}
-    graph = graph_tensors({"pair": made.graph})
+    good = {k: v.copy() for k, v in block.tensors.items()}
+    graph = graph_tensors({"pair": block.graph})
     first = sorted(good)[0]
     cases = {
         "nothing": (None, good),
@@ -356,7 +356,7 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
     with pytest.raises(MotionloomError, match="larger"):
         PairBlock.load(path, prior)  # type: ignore[arg-type]
     with pytest.raises(MotionloomError, match="suffix"):
-        made.save(tmp_path / "a.pt")
+        block.save(tmp_path / "a.pt")
     assert all(name.isidentifier() for name in blocks())
 
 
@@ -400,10 +400,10 @@ def test_a_published_checkpoint_comes_apart_where_its_block_sits(tmp_path):
     torch.save(state, tmp_path / "model000100000.pt")
     (tmp_path / "args.json").write_text(json.dumps({"multi_func": "in_both_out_cond"}))
     whole = tiny.prior()
-    made = import_block(tmp_path / "model000100000.pt", replace(whole, net=prior_session(prior)), base="pw3d")
-    assert made.config.adds == "condition"
-    assert made.name == "model000100000"
-    np.testing.assert_array_equal(made.tensors["place.weight"], state["multi_person.canon_out.weight"])
+    block = import_block(tmp_path / "model000100000.pt", replace(whole, net=prior_session(prior)), base="pw3d")
+    assert block.config.adds == "condition"
+    assert block.name == "model000100000"
+    np.testing.assert_array_equal(block.tensors["place.weight"], state["multi_person.canon_out.weight"])
     with pytest.raises(MotionloomError, match="same file"):
         import_block(tmp_path / "model000100000.pt", whole, base="tiny")
 
@@ -436,6 +436,6 @@ def test_the_condition_alone_is_corrected_where_that_is_said():
 
 
 def test_codes_of_places_live_in_the_file(tmp_path):
-    made, prior = block_of("published")
-    said = replace(made, config=replace(made.config, places=PlaceCode("world", 0.1, 0.1)))
-    assert PairBlock.load(said.save(tmp_path / "a.safetensors"), prior).config.places == PUBLISHED_CODE  # type: ignore[arg-type]
+    block, prior = block_of("published")
+    moved = replace(block, config=replace(block.config, places=PlaceCode("world", 0.1, 0.1)))
+    assert PairBlock.load(moved.save(tmp_path / "a.safetensors"), prior).config.places == PUBLISHED_CODE  # type: ignore[arg-type]

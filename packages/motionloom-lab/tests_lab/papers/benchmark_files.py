@@ -38,10 +38,10 @@ def humaneva(folder: Path, **changes: dict[str, np.ndarray]) -> Path:
 
 
 def starts(protocol: Protocol) -> dict[str, list[int]]:
-    found: dict[str, list[int]] = {}
+    result: dict[str, list[int]] = {}
     for recording, start in protocol.windows():
-        found.setdefault(recording.name, []).append(start)
-    return found
+        result.setdefault(recording.name, []).append(start)
+    return result
 
 
 def z_up(frames: int) -> np.ndarray:

@@ -60,8 +60,8 @@ def test_amass_places_keep_the_files_axes(tmp_path: Path) -> None:
     """What a network sees are the file's places less the root, +Z up."""
     read = read_amass(amass_folder(tmp_path))
     one = next(r for r in read.recordings if r.action == "CMU")
-    seen = read.layout.encode(one.positions, read.layout.place(one.positions[29])).reshape(200, 21, 3)
-    assert np.allclose(seen, z_up(200)[:, 1:] - z_up(200)[:, :1], atol=1e-6)
+    features = read.layout.encode(one.positions, read.layout.place(one.positions[29])).reshape(200, 21, 3)
+    assert np.allclose(features, z_up(200)[:, 1:] - z_up(200)[:, :1], atol=1e-6)
 
 
 def test_amass_poses_stand_up_and_are_the_uniform_person(tmp_path: Path) -> None:
@@ -71,8 +71,8 @@ def test_amass_poses_stand_up_and_are_the_uniform_person(tmp_path: Path) -> None
     one = read.recordings[0]
     assert (one.name, one.subject, one.action) == ("DFaust/50002/hips_poses", "DFaust/50002", "DFaust")
     assert one.positions.shape == (350, 22, 3)
-    seen = read.layout.encode(one.positions, read.layout.place(one.positions[0])).reshape(350, 21, 3)
-    head, left_hip, right_hip = seen[0, 14], seen[0, 0], seen[0, 1]
+    features = read.layout.encode(one.positions, read.layout.place(one.positions[0])).reshape(350, 21, 3)
+    head, left_hip, right_hip = features[0, 14], features[0, 0], features[0, 1]
     assert head[2] > 0.5
     assert left_hip[0] > 0.03
     assert right_hip[0] < -0.03
@@ -101,9 +101,9 @@ def test_broken_recordings_are_reported_and_left_out(tmp_path: Path) -> None:
     (place / "junk_poses.npz").write_bytes(b"PK junk")
     (place / "empty.npy").write_bytes(b"")
     (place / "male_stagei.npz").write_bytes(b"betas of a person, no recording")
-    told: list[str] = []
-    read = read_amass(tmp_path, say=told.append)
-    assert sum(line.startswith("left out SOMA/a/") for line in told) == 5
+    lines: list[str] = []
+    read = read_amass(tmp_path, say=lines.append)
+    assert sum(line.startswith("left out SOMA/a/") for line in lines) == 5
     assert not any(r.action == "SOMA" for r in read.recordings)
 
 
@@ -119,8 +119,8 @@ def test_a_published_list_names_the_windows(tmp_path: Path) -> None:
         "SSM,gone_poses,5,180,299",
     ]
     (tmp_path / "list.csv").write_text("\n".join(rows))
-    told: list[str] = []
-    read = read_amass(folder, segments=tmp_path / "list.csv", say=told.append)
+    lines: list[str] = []
+    read = read_amass(folder, segments=tmp_path / "list.csv", say=lines.append)
     assert read.listed == (
         ("SSM/p/c_poses", 270),
         ("GRAB/s1/lift_poses", 150),
@@ -128,7 +128,7 @@ def test_a_published_list_names_the_windows(tmp_path: Path) -> None:
         ("GRAB/s2/lift_poses", 270),
     )
     assert [(r.name, s) for r, s in read.windows()] == list(read.listed)
-    assert any("1 of the 5 windows of list.csv are not there" in line for line in told)
+    assert any("1 of the 5 windows of list.csv are not there" in line for line in lines)
 
 
 def test_a_list_of_ones_own_names_files_and_first_frames(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def still(frames: int) -> Motion:
     return decode(numbers)
 
 
-def shown(item: babel.BabelItem) -> tuple[int, int]:
+def frames_of(item: babel.BabelItem) -> tuple[int, int]:
     """First and last (half-open) frame of `still` that an item holds."""
     numbers = np.round(item.features[:, 0] * 100).astype(int)
     assert (np.diff(numbers) == 1).all()
@@ -96,15 +96,15 @@ def shown(item: babel.BabelItem) -> tuple[int, int]:
 
 def test_labels_are_read_as_processed_in_order_of_time(tmp_path: Path) -> None:
     labels = [label("turn left", 4, 6, ["turn"]), label("walk", 0, 4.5), label("gone", 3, 3)]
-    found = babel.find_recordings(folder(tmp_path, labels))
-    assert len(found) == 1
-    assert (found[0].name, found[0].split, found[0].place, found[0].whole) == (
+    recordings = babel.find_recordings(folder(tmp_path, labels))
+    assert len(recordings) == 1
+    assert (recordings[0].name, recordings[0].split, recordings[0].place, recordings[0].whole) == (
         "babel_12",
         "train",
         PLACE,
         ("walk around",),
     )
-    assert [(s.text, s.acts, s.start, s.end) for s in found[0].segments] == [
+    assert [(s.text, s.acts, s.start, s.end) for s in recordings[0].segments] == [
         ("walk", ("walk",), 0, 4.5),
         ("turn left", ("turn",), 4, 6),
     ]
@@ -114,8 +114,8 @@ def test_both_splits_and_the_releases_own_folder_are_found(tmp_path: Path) -> No
     (tmp_path / "babel_v1.0_release").mkdir()
     (tmp_path / "babel_v1.0_release" / "val.json").write_text(json.dumps({"7": entry(None)}))
     (tmp_path / "train.json").write_text(json.dumps({"12": entry(None)}))
-    found = babel.find_recordings(tmp_path)
-    assert [(r.name, r.split, r.segments) for r in found] == [("babel_12", "train", ()), ("babel_7", "val", ())]
+    recordings = babel.find_recordings(tmp_path)
+    assert [(r.name, r.split, r.segments) for r in recordings] == [("babel_12", "train", ()), ("babel_7", "val", ())]
     with pytest.raises(MotionloomError, match=r"test\.json"):
         babel.find_recordings(tmp_path, splits=("test",))
 
@@ -282,8 +282,8 @@ def test_a_labelled_transition_joins_what_it_touches() -> None:
 
 
 def test_three_actions_in_a_row_are_two_pairs() -> None:
-    made = spans(("walk", 0, 3), ("turn", 3, 5), ("sit", 5, 9))
-    assert sorted(pair[0] for pair in made) == [("turn", "sit"), ("walk", "turn")]
+    parts = spans(("walk", 0, 3), ("turn", 3, 5), ("sit", 5, 9))
+    assert sorted(pair[0] for pair in parts) == [("turn", "sit"), ("walk", "turn")]
 
 
 @pytest.mark.parametrize("pose", ["t-pose", "T pose", "a pose", "A-Pose"])
@@ -299,8 +299,8 @@ def test_a_category_tells_too() -> None:
         Segment("sit", ("sit",), 5, 9),
         Segment("stand still", ("stand", "t pose"), 9, 12),
     )
-    made = babel.pairs(parts)
-    assert [(p.texts, p.between) for p in made] == [(("walk", "sit"), (4, 5))]
+    pairs = babel.pairs(parts)
+    assert [(p.texts, p.between) for p in pairs] == [(("walk", "sit"), (4, 5))]
 
 
 # Items
@@ -309,16 +309,16 @@ def test_a_category_tells_too() -> None:
 def test_a_pair_makes_four_items_with_flags_in_the_transition() -> None:
     """Ten seconds at 30 fps: walk to 4 s, transition to 5 s, sit to 9 s."""
     one = recording(("walk", 0, 4), ("transition", 4, 5), ("sit", 5, 9))
-    made = list(babel.items(one, still(300)))
-    found = [(i.text, *shown(i), np.flatnonzero(i.flags).tolist()) for i in made]
-    assert found == [
+    items = list(babel.items(one, still(300)))
+    contents = [(i.text, *frames_of(i), np.flatnonzero(i.flags).tolist()) for i in items]
+    assert contents == [
         ("walk", 0, 120, []),
         ("sit", 150, 270, []),
         ("walk", 0, 150, list(range(120, 150))),
         ("sit", 120, 270, list(range(30))),
     ]
-    assert len({i.name for i in made}) == 4
-    assert all(len(i.flags) == len(i) for i in made)
+    assert len({i.name for i in items}) == 4
+    assert all(len(i.flags) == len(i) for i in items)
 
 
 def test_an_item_is_a_motion_of_its_own() -> None:
@@ -329,8 +329,8 @@ def test_an_item_is_a_motion_of_its_own() -> None:
 
 
 def test_what_two_pairs_share_is_one_item() -> None:
-    made = list(babel.items(recording(("walk", 0, 3), ("turn", 3, 6), ("sit", 6, 9)), still(300)))
-    assert sorted(i.text for i in made) == ["sit", "turn", "walk"]
+    items = list(babel.items(recording(("walk", 0, 3), ("turn", 3, 6), ("sit", 6, 9)), still(300)))
+    assert sorted(i.text for i in items) == ["sit", "turn", "walk"]
 
 
 @pytest.mark.parametrize(("frames", "kept"), [(44, 0), (45, 1), (250, 1), (254, 1), (255, 0)])
@@ -342,16 +342,16 @@ def test_lengths_are_limited(frames: int, kept: int) -> None:
 
 def test_longer_ones_are_cropped_at_random_when_asked() -> None:
     one = recording(("walk", 0, 20), ("sit", 20, 21))
-    made = [next(babel.items(one, still(650), crop=np.random.default_rng(s))) for s in range(8)]
-    places = [shown(i) for i in made]
+    items = [next(babel.items(one, still(650), crop=np.random.default_rng(s))) for s in range(8)]
+    places = [frames_of(i) for i in items]
     assert {b - a for a, b in places} == {250}
     assert len({a for a, _ in places}) > 4
     assert all(a >= 0 and b <= 600 for a, b in places)
 
 
 def test_labels_beyond_the_recording_are_cut_to_it() -> None:
-    made = list(babel.items(recording(("walk", 0, 4), ("sit", 4, 99)), still(240)))
-    assert shown(made[1]) == (120, 240)
+    items = list(babel.items(recording(("walk", 0, 4), ("sit", 4, 99)), still(240)))
+    assert frames_of(items[1]) == (120, 240)
 
 
 @pytest.mark.parametrize(
@@ -359,9 +359,9 @@ def test_labels_beyond_the_recording_are_cut_to_it() -> None:
 )
 def test_items_lose_up_to_four_frames_at_random(frames: int, lengths: tuple[int, int]) -> None:
     item = babel.BabelItem("a", "walk", np.zeros((frames, 135), np.float32), np.zeros(frames, bool))
-    found = {len(babel.trimmed(item, np.random.default_rng(s))) for s in range(60)}
-    assert (min(found), max(found)) == lengths
-    assert len(found) == lengths[1] - lengths[0] + 1
+    recordings = {len(babel.trimmed(item, np.random.default_rng(s))) for s in range(60)}
+    assert (min(recordings), max(recordings)) == lengths
+    assert len(recordings) == lengths[1] - lengths[0] + 1
 
 
 def test_items_are_cut_at_thirty_frames_per_second(tmp_path: Path) -> None:
@@ -373,14 +373,14 @@ def test_items_are_cut_at_thirty_frames_per_second(tmp_path: Path) -> None:
 def test_a_folder_becomes_items(tmp_path: Path) -> None:
     """Ten seconds of gliding: 135 numbers, the height of the recording, a metre per second towards -X as published."""
     labels = [label("walk", 0, 4), label("transition", 4, 5), label("sit", 5, 9)]
-    made = babel.load_items(folder(tmp_path, labels))
-    assert [(i.text, len(i)) for i in made] == [("walk", 120), ("sit", 120), ("walk", 150), ("sit", 150)]
-    for item in made:
+    items = babel.load_items(folder(tmp_path, labels))
+    assert [(i.text, len(i)) for i in items] == [("walk", 120), ("sit", 120), ("walk", 150), ("sit", 150)]
+    for item in items:
         assert item.features.dtype == np.float32
         np.testing.assert_allclose(item.features[:, 0], 0.95, atol=1e-6)
         np.testing.assert_allclose(item.features[1:, 1].mean(), -1 / 30, rtol=0.01)
         assert item.features[0, 1:3].tolist() == [0, 0]
-    mean, std = babel.statistics(made)
+    mean, std = babel.statistics(items)
     assert (mean.shape, std.shape) == ((135,), (135,))
     assert mean[0] == pytest.approx(0.95)
     assert (std > 0).all()
@@ -394,9 +394,9 @@ def test_what_is_missing_or_too_short_is_named_or_left_out(tmp_path: Path) -> No
     amass(tmp_path / "CMU/02/b_poses.npz", frames=40)
     with pytest.raises(MotionloomError, match="a_poses"):
         babel.load_items(tmp_path)
-    said: list[str] = []
-    assert len(babel.load_items(tmp_path, dropped=said.append)) == 2
-    assert ["a_poses" in said[0], "b_poses" in said[1], len(said)] == [True, True, 2]
+    lines: list[str] = []
+    assert len(babel.load_items(tmp_path, dropped=lines.append)) == 2
+    assert ["a_poses" in lines[0], "b_poses" in lines[1], len(lines)] == [True, True, 2]
 
 
 def test_statistics_of_nothing_are_refused() -> None:
@@ -416,7 +416,7 @@ def test_the_builder_reads_a_babel_folder(tmp_path: Path) -> None:
     assert [(t.name, t.source, t.split) for t in takes] == [("babel_12", "babel", "train")]
     build([root], tmp_path / "set", workers=1, mixed=0, find=find_takes, progress=lambda line: None)
     clip = read_clip(tmp_path / "set" / "clips" / "babel_12.safetensors")
-    written = [(n.first, n.last, n.texts) for n in clip.notes if n.kind == "human"]
-    assert written == [(0, len(clip.features), ("walk around",)), (0, 80, ("walk",)), (100, 180, ("sit",))]
+    captions = [(n.first, n.last, n.texts) for n in clip.notes if n.kind == "human"]
+    assert captions == [(0, len(clip.features), ("walk around",)), (0, 80, ("walk",)), (100, 180, ("sit",))]
     assert np.median(clip.features[:, 2]) == pytest.approx(0.05, rel=0.05)
     assert "BABEL" in clip.licence

@@ -48,10 +48,10 @@ def test_h36m_keeps_the_17_joints_and_the_files_numbers(tmp_path: Path) -> None:
     path = h36m(tmp_path)
     one = read_h36m(path).recordings[0]
     file = person(151)
-    kept = [1, 2, 3, 6, 7, 8, 12, 13, 14, 15, 17, 18, 19, 25, 26, 27]
+    joints = [1, 2, 3, 6, 7, 8, 12, 13, 14, 15, 17, 18, 19, 25, 26, 27]
     layout = read_h36m(path).layout
-    seen = layout.encode(one.positions, layout.place(one.positions[24]))
-    assert np.allclose(seen.reshape(151, 16, 3), file[:, kept] - file[:, :1], atol=1e-6)
+    features = layout.encode(one.positions, layout.place(one.positions[24]))
+    assert np.allclose(features.reshape(151, 16, 3), file[:, joints] - file[:, :1], atol=1e-6)
     assert np.allclose(one.positions[:, 0], file[:, 0, [1, 2, 0]])  # the root keeps its way
 
 
@@ -89,9 +89,9 @@ def test_endless_names_take_no_endless_time(name: str) -> None:
 
 def test_a_tenth_of_each_persons_actions_is_held_out() -> None:
     """Of 30 actions in 15 pairs three each, and over five people every pair exactly once; one action stays."""
-    kept = [held_out(30, person) for person in range(5)]
-    assert [len(k) for k in kept] == [3] * 5
-    assert sorted(i // 2 for k in kept for i in k) == list(range(15))
+    numbers = [held_out(30, person) for person in range(5)]
+    assert [len(k) for k in numbers] == [3] * 5
+    assert sorted(i // 2 for k in numbers for i in k) == list(range(15))
     assert held_out(1, 0) == held_out(0, 3) == set()
     assert all(
         len(held_out(n, s)) == max(1, n // 10) and held_out(n, s) <= set(range(n))
@@ -102,9 +102,9 @@ def test_a_tenth_of_each_persons_actions_is_held_out() -> None:
 
 def test_missing_subjects_are_reported(tmp_path: Path) -> None:
     """A file with one subject is read and the others are named; one with none is refused."""
-    told: list[str] = []
-    read_h36m(write(tmp_path / "a.npz", {"S9": {"Waiting": person(130)}}), say=told.append)
-    assert any("lacks S1, S5, S6, S7, S8, S11" in line for line in told)
+    lines: list[str] = []
+    read_h36m(write(tmp_path / "a.npz", {"S9": {"Waiting": person(130)}}), say=lines.append)
+    assert any("lacks S1, S5, S6, S7, S8, S11" in line for line in lines)
     with pytest.raises(MotionloomError, match=r"none of the subjects .* it has 'S2'"):
         read_h36m(write(tmp_path / "b.npz", {"S2": {"Waiting": person(130)}}))
 
@@ -132,9 +132,9 @@ def test_humaneva_drops_three_chunks_and_short_ones(tmp_path: Path) -> None:
 def test_humaneva_windows_and_exactly_75_frames(tmp_path: Path) -> None:
     """80 frames give the one window at 0, and 75 none for the test but a recording that training may draw."""
     read = read_humaneva(humaneva(tmp_path))
-    found = starts(read)
-    assert found["Validate/S1/Walking 1 chunk0"] == [0]
-    assert "Validate/S1/Box 1 chunk0" not in found
+    first = starts(read)
+    assert first["Validate/S1/Walking 1 chunk0"] == [0]
+    assert "Validate/S1/Box 1 chunk0" not in first
     assert any(len(r.positions) == 75 for r in read.split("train"))
     assert (read.fps, read.observed, read.future, read.layout.joints) == (60.0, 15, 60, 15)
     assert {r.name.split("/")[0] for r in read.split("test")} == {"Validate"}

@@ -31,14 +31,14 @@ def other(prior):
     return adapted(prior.net, adapter_of(trained(net), net))
 
 
-def given(names: str = "left_wrist,root_horizontal") -> tuple[np.ndarray, np.ndarray]:
+def known_part(names: str = "left_wrist,root_horizontal") -> tuple[np.ndarray, np.ndarray]:
     known = normal((2, FRAMES, 263), 4)
     return known, np.broadcast_to(np.asarray(mask(names)), known.shape)
 
 
 def draw_of(prior, nets, known, flags, **options):
-    given = Observed(known, flags, options.pop("noise_free", True))
-    return control_features(prior, nets, PROMPTS, given, seeds=[5, 6], **({"steps": 6} | options))
+    observed = Observed(known, flags, options.pop("noise_free", True))
+    return control_features(prior, nets, PROMPTS, observed, seeds=[5, 6], **({"steps": 6} | options))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -50,18 +50,18 @@ def test_the_walk_is_the_published_loop(seed, noise_free):
     known = rng.standard_normal((2, 7, 5), np.float32)
     flags = rng.random((2, 7, 5)) < 0.4
     noises = [rng.standard_normal(known.shape, np.float32) for _ in range(steps + 1)]
-    drawn = iter(noises)
+    draws = iter(noises)
 
     def guess(x: np.ndarray, level: int) -> np.ndarray:
         return np.tanh(x) + 0.1 * np.roll(x, 1, 1) + 0.01 * level
 
-    got = controlled(
+    motion = controlled(
         guess,
         Observed(known, flags, noise_free),
         levels=range(steps, -1, -1),
         solver=SOLVERS["ddpm"],
         schedule=schedule,
-        noise=lambda like: next(drawn),
+        noise=lambda like: next(draws),
     )
     bars = [1.0, *np.cumprod(1 - schedule.betas).tolist()]
     free = (~flags).astype(np.float32) if noise_free else np.ones_like(known)
@@ -73,13 +73,13 @@ def test_the_walk_is_the_published_loop(seed, noise_free):
         clean = np.where(flags, known, guess(x, t))
         mean = math.sqrt(before) * beta * clean + math.sqrt(1 - beta) * (1 - before) * x
         x = mean / (1 - bars[t]) + math.sqrt(beta * (1 - before) / (1 - bars[t])) * noises[steps + 1 - t] * free
-    np.testing.assert_allclose(got, x, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(motion, x, rtol=1e-4, atol=1e-5)
 
 
 def test_given_numbers_come_out_exactly_and_are_free_of_noise_on_the_way(prior, other):
     """Every state that the network is shown holds signal * given; the answer holds the given numbers to the bit."""
-    known, flags = given()
-    seen = []
+    known, flags = known_part()
+    calls = []
 
     def watch(row: np.ndarray, level: int) -> np.ndarray:
         return row
@@ -87,25 +87,25 @@ def test_given_numbers_come_out_exactly_and_are_free_of_noise_on_the_way(prior, 
     class Spy:
         bind = staticmethod(prior.net.bind)
 
-        def show(self, bound, given, mask):
+        def show(self, bound, known_part, mask):
             return bound
 
         def __call__(self, x, level, bound):
-            seen.append((level, x))
+            calls.append((level, x))
             return prior.net(x, level, bound)
 
     out = draw_of(prior, [Spy()], known, flags, corrections=[watch, None])
     assert np.array_equal(out[flags], known[flags])
-    assert [level for level, _ in seen] == levels(prior.schedule, 6, spacing="early")[:-1]
-    for level, x in seen:
-        wanted = prior.schedule.at(level)[0] * known
-        np.testing.assert_allclose(x[:2][flags], wanted[flags], atol=1e-5)
-        np.testing.assert_allclose(x[2:][flags], wanted[flags])  # the rows without text see it too
+    assert [level for level, _ in calls] == levels(prior.schedule, 6, spacing="early")[:-1]
+    for level, x in calls:
+        target = prior.schedule.at(level)[0] * known
+        np.testing.assert_allclose(x[:2][flags], target[flags], atol=1e-5)
+        np.testing.assert_allclose(x[2:][flags], target[flags])  # the rows without text see it too
     assert np.array_equal(draw_of(prior, [other], known, flags, noise_free=False)[flags], known[flags])
 
 
 def test_weights_one_and_zero_are_the_first_network_and_two_equal_networks_are_one(prior, other):
-    known, flags = given()
+    known, flags = known_part()
     first, second = (draw_of(prior, [net], known, flags) for net in (prior.net, other))
     np.testing.assert_allclose(draw_of(prior, [prior.net, other], known, flags, weights=(1.0, 0.0)), first, atol=1e-5)
     np.testing.assert_allclose(draw_of(prior, [prior.net, other], known, flags, weights=(0.0, 1.0)), second, atol=1e-5)
@@ -115,13 +115,13 @@ def test_weights_one_and_zero_are_the_first_network_and_two_equal_networks_are_o
 
 def test_weights_may_depend_on_level_frame_and_number(prior, other):
     """In one step the blend can be read off: every number follows the network that its weight names."""
-    known, flags = given()
+    known, flags = known_part()
     chosen = np.zeros((FRAMES, 263), np.float32)
     chosen[:4, 100:] = 1.0
-    asked = []
+    levels = []
 
     def rest(level: int) -> np.ndarray:
-        asked.append(level)
+        levels.append(level)
         return 1 - chosen
 
     first, second, both = (
@@ -129,12 +129,12 @@ def test_weights_may_depend_on_level_frame_and_number(prior, other):
         for nets, weights in (([prior.net], None), ([other], None), ([prior.net, other], [chosen, rest]))
     )
     np.testing.assert_allclose(both, np.where(chosen.astype(bool), first, second), atol=1e-5)
-    assert asked == [prior.schedule.steps]
+    assert levels == [prior.schedule.steps]
 
 
 def test_an_empty_mask_is_plain_sampling(prior):
     """The same noise, no control: the motion that the text alone gives."""
-    known, flags = given()
+    known, flags = known_part()
     cond = prior.condition(PROMPTS)
     draw = row_noise([5, 6])
     plain = run(
@@ -151,7 +151,7 @@ def test_an_empty_mask_is_plain_sampling(prior):
 
 
 def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_given(prior, other):
-    known, flags = given()
+    known, flags = known_part()
     both = draw_of(prior, [other], known, flags)
     alone = control_features(prior, [other], PROMPTS[1:], Observed(known[1:], flags[1:], True), seeds=[6], steps=6)
     np.testing.assert_allclose(both[1:], alone, rtol=1e-4, atol=1e-5)
@@ -161,7 +161,7 @@ def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_giv
 
 def test_networks_see_what_is_given_only_without_noise(prior, other):
     """MDM's inpainting tells no network what is given; algorithm 2 tells those that can be told."""
-    known, flags = given()
+    known, flags = known_part()
     net = prior_module(prior)
     full = adapter_of(trained(net), net)
     tensors = {k: v for k, v in full.tensors.items() if not k.startswith("given.")}
@@ -175,7 +175,7 @@ def test_networks_see_what_is_given_only_without_noise(prior, other):
 
 
 def test_corrections_change_the_guess_and_given_numbers_have_the_last_word(prior):
-    known, flags = given()
+    known, flags = known_part()
     out = draw_of(prior, [prior.net], known, flags, corrections=[lambda row, level: np.full_like(row, 0.25), None])
     np.testing.assert_allclose(out[0], np.where(flags[0], known[0], 0.25), atol=1e-5)
     np.testing.assert_allclose(out[1], draw_of(prior, [prior.net], known, flags)[1], atol=1e-5)
@@ -195,7 +195,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("mistake", MISTAKES.values(), ids=MISTAKES)
 def test_what_does_not_fit_together_is_refused_in_a_sentence(prior, mistake):
-    known, flags = given()
+    known, flags = known_part()
     options = {"nets": [prior.net], "known": known, "mask": flags, "seeds": [1, 2]} | mistake(known, flags)
     observed = Observed(options.pop("known"), options.pop("mask"), noise_free=True)
     with pytest.raises(MotionloomError) as caught:

@@ -258,10 +258,10 @@ def test_repetitions_are_rows_of_their_own() -> None:
 
 
 def test_flags_mark_what_rows_share() -> None:
-    found = flags(Plan.of([70, 80, 75], (20, 10), 5)).tolist()
-    assert found[0] == [0] * 50 + [1] * 20 + [0] * 10
-    assert found[1] == [1] * 20 + [0] * 50 + [1] * 10
-    assert found[2] == [1] * 10 + [0] * 70
+    marks = flags(Plan.of([70, 80, 75], (20, 10), 5)).tolist()
+    assert marks[0] == [0] * 50 + [1] * 20 + [0] * 10
+    assert marks[1] == [1] * 20 + [0] * 50 + [1] * 10
+    assert marks[2] == [1] * 10 + [0] * 70
 
 
 @pytest.mark.parametrize(
@@ -304,17 +304,17 @@ PROMPTS = ["a person walks", "a person jumps", "a person waves"]
 def test_features_of_many_prompts_decode_to_one_continuous_motion(config, mode) -> None:
     """Lengths, ends, finiteness, the same seed the same motion, and no step of the root beyond what a frame says."""
     prior = tiny.prior(config)
-    made, ends = double_take_features(prior, PROMPTS, [70, 83, 75], mode=mode, ramp=10, steps=6, seed=4)
+    motion, ends = double_take_features(prior, PROMPTS, [70, 83, 75], mode=mode, ramp=10, steps=6, seed=4)
     again, _ = double_take_features(prior, PROMPTS, [70, 83, 75], mode=mode, ramp=10, steps=6, seed=4)
     other, _ = double_take_features(prior, PROMPTS, [70, 83, 75], mode=mode, ramp=10, steps=6, seed=5)
-    assert made.shape == (188, 263)
+    assert motion.shape == (188, 263)
     assert ends == [70, 133, 188]
-    assert np.isfinite(made).all()
-    assert np.array_equal(made, again)
-    assert not np.array_equal(made, other)
-    positions = humanml.decode_positions(made.astype(np.float64))
+    assert np.isfinite(motion).all()
+    assert np.array_equal(motion, again)
+    assert not np.array_equal(motion, other)
+    positions = humanml.decode_positions(motion.astype(np.float64))
     speed = np.linalg.norm(np.diff(positions[:, 0, [0, 2]], axis=0), axis=-1)
-    assert speed == pytest.approx(np.linalg.norm(made[:-1, 1:3], axis=-1), abs=1e-5)
+    assert speed == pytest.approx(np.linalg.norm(motion[:-1, 1:3], axis=-1), abs=1e-5)
 
 
 def test_paper_rows_do_not_see_the_padding_and_published_rows_do() -> None:
@@ -322,10 +322,10 @@ def test_paper_rows_do_not_see_the_padding_and_published_rows_do() -> None:
     prior = tiny.prior(tiny.PUBLISHED)
 
     def first_rows(mode, longest: int) -> np.ndarray:
-        made, _ = double_take_features(
+        motion, _ = double_take_features(
             prior, PROMPTS[:2], [70, longest], mode=mode, ramp=10, steps=4, second_take_only=True
         )
-        return made[:30]
+        return motion[:30]
 
     assert np.allclose(first_rows("paper", 75), first_rows("paper", 90), atol=1e-5)
     assert not np.allclose(first_rows("published", 75), first_rows("published", 90), atol=1e-3)
@@ -336,19 +336,19 @@ def test_a_network_with_flags_sees_what_is_shared(monkeypatch: pytest.MonkeyPatc
     from dataclasses import replace
 
     prior = tiny.prior(replace(tiny.PUBLISHED, flags=True))
-    made, _ = double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4, first_take_only=True)
-    seen: list[np.ndarray] = []
+    motion, _ = double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4, first_take_only=True)
+    states: list[np.ndarray] = []
     bind = PriorSession.bind
-    monkeypatch.setattr(PriorSession, "bind", lambda net, cond: seen.append(cond.flags) or bind(net, cond))
+    monkeypatch.setattr(PriorSession, "bind", lambda net, cond: states.append(cond.flags) or bind(net, cond))
     double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4)
-    assert made.shape == (125, 263)
-    assert seen[0].tolist() == flags(Plan.of([70, 75], 20, 10)).tolist()
-    assert not seen[-1].any()
+    assert motion.shape == (125, 263)
+    assert states[0].tolist() == flags(Plan.of([70, 75], 20, 10)).tolist()
+    assert not states[-1].any()
 
 
 def test_one_prompt_is_a_motion_of_its_own() -> None:
-    made, ends = double_take_features(tiny.prior(), PROMPTS[:1], [30], steps=5)
-    assert made.shape == (30, 263)
+    motion, ends = double_take_features(tiny.prior(), PROMPTS[:1], [30], steps=5)
+    assert motion.shape == (30, 263)
     assert ends == [30]
     assert len(sample_features(tiny.prior(), PROMPTS[:1], [30], seeds=[0], steps=5)[0]) == 30
 
@@ -376,14 +376,14 @@ def test_bad_requests_get_one_sentence(change: dict, said: str) -> None:
 
 def test_an_interval_longer_than_the_data_is_made_and_told() -> None:
     with pytest.warns(UserWarning, match="at most 196"):
-        made, _ = double_take_features(tiny.prior(), PROMPTS[:2], [70, 200], ramp=10, steps=2)
-    assert len(made) == 250
+        motion, _ = double_take_features(tiny.prior(), PROMPTS[:2], [70, 200], ramp=10, steps=2)
+    assert len(motion) == 250
 
 
 def test_first_take_leaves_rows_alone_where_nothing_joins_them() -> None:
     """Second take only: rows are sampled as if they were alone."""
     plan = Plan.of([40, 40], 10, 2)
     x, draws = noise(plan, 0)
-    made = first_take(first_net, x, plan, way=WAY, schedule=SCHEDULE, noise=draws[0], join=False)
+    rows = first_take(first_net, x, plan, way=WAY, schedule=SCHEDULE, noise=draws[0], join=False)
     x, draws = noise(plan, 0)
-    assert np.array_equal(made, run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0]))
+    assert np.array_equal(rows, run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0]))

@@ -65,26 +65,26 @@ def motion(frames: int, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("frames", [4, 61, 120, 192, 195, 196, 199, 240])
 def test_a_motion_is_read_as_the_published_loader_shows_it(guo: GuoEvaluator, frames: int) -> None:
     """Standardised by the evaluator's numbers, contacts off, cut to fours, zeros to 196 frames; then a plain loop."""
-    given_ = motion(frames)
+    clip = motion(frames)
     length = frames // 4 * 4
-    shown = np.zeros((max(196, length), 259))
-    shown[:length] = ((given_ - guo.mean) / guo.std)[:length, :259]
-    found = guo.motions([given_])
-    assert found.dtype == np.float64
-    np.testing.assert_allclose(found[0], Naive(state(JUDGE)).motion(shown, length), atol=2e-4)
+    padding = np.zeros((max(196, length), 259))
+    padding[:length] = ((clip - guo.mean) / guo.std)[:length, :259]
+    points = guo.motions([clip])
+    assert points.dtype == np.float64
+    np.testing.assert_allclose(points[0], Naive(state(JUDGE)).motion(padding, length), atol=2e-4)
 
 
 def test_contacts_are_not_shown_and_the_root_weighs_25_times(guo: GuoEvaluator) -> None:
-    given_ = motion(40)
-    touched = given_.copy()
+    clip = motion(40)
+    touched = clip.copy()
     touched[:, 259:] += 1
-    assert np.array_equal(guo.motions([touched]), guo.motions([given_]))
+    assert np.array_equal(guo.motions([touched]), guo.motions([clip]))
     mean, std = statistics()
     plain = std.copy()
     plain[[0, 1, 2, 3, 259, 260, 261, 262]] *= 25
-    wide = mean + (given_ - mean) * np.where(np.arange(263) < 4, 25, 1)
-    np.testing.assert_allclose(replace(guo, std=plain).motions([wide]), guo.motions([given_]), atol=1e-5)
-    assert np.abs(replace(guo, std=plain).motions([given_]) - guo.motions([given_])).max() > 0.01
+    wide = mean + (clip - mean) * np.where(np.arange(263) < 4, 25, 1)
+    np.testing.assert_allclose(replace(guo, std=plain).motions([wide]), guo.motions([clip]), atol=1e-5)
+    assert np.abs(replace(guo, std=plain).motions([clip]) - guo.motions([clip])).max() > 0.01
 
 
 @settings(max_examples=15, deadline=None)
@@ -92,26 +92,26 @@ def test_contacts_are_not_shown_and_the_root_weighs_25_times(guo: GuoEvaluator) 
 def test_a_motion_alone_is_that_motion_in_any_company(tmp_path_factory, lengths: list[int], random) -> None:
     guo = judge(tmp_path_factory.mktemp("words"))
     some = [motion(length, seed) for seed, length in enumerate(lengths)]
-    found = guo.motions(some)
+    points = guo.motions(some)
     for row, one in enumerate(some):
-        np.testing.assert_allclose(guo.motions([one])[0], found[row], atol=1e-5)
+        np.testing.assert_allclose(guo.motions([one])[0], points[row], atol=1e-5)
     order = list(range(len(some)))
     random.shuffle(order)
-    np.testing.assert_allclose(guo.motions([some[i] for i in order]), found[order], atol=1e-5)
+    np.testing.assert_allclose(guo.motions([some[i] for i in order]), points[order], atol=1e-5)
 
 
 def test_long_motions_of_other_lengths_put_nothing_after_each_other(guo: GuoEvaluator) -> None:
     some = [motion(length) for length in (240, 196, 192, 236, 240)]
-    found = guo.motions(some)
+    points = guo.motions(some)
     for row, one in enumerate(some):
-        np.testing.assert_allclose(guo.motions([one])[0], found[row], atol=1e-5)
+        np.testing.assert_allclose(guo.motions([one])[0], points[row], atol=1e-5)
 
 
 def test_more_motions_than_one_batch_come_back_in_order(guo: GuoEvaluator) -> None:
     some = [motion(4 + 3 * (i % 30), i) for i in range(150)]
-    found = guo.motions(some)
+    points = guo.motions(some)
     for row in (0, 63, 64, 149):
-        np.testing.assert_allclose(found[row], guo.motions([some[row]])[0], atol=1e-5)
+        np.testing.assert_allclose(points[row], guo.motions([some[row]])[0], atol=1e-5)
     assert guo.motions([]).shape == (0, 9)
 
 
@@ -123,14 +123,14 @@ def test_a_caption_is_read_as_22_tagged_words_of_its_length(guo: GuoEvaluator, c
         1: ([5, 2, 4] + [3] * 19, ["OTHER", "VERB"] + ["OTHER"] * 20, 3),
         2: ([5] + [2, 3] * 10 + [4], ["OTHER"] + ["VERB", "OTHER"] * 10 + ["OTHER"], 22),
     }
-    found = guo.with_caption_length(cap_len).texts(CAPTIONS)
-    assert found.dtype == np.float64
+    points = guo.with_caption_length(cap_len).texts(CAPTIONS)
+    assert points.dtype == np.float64
     for row, (numbers, names, length) in rows.items():
         words = np.repeat(np.array(numbers, dtype=float)[:, None], 4, axis=1)
         tags = np.eye(15)[[TAGS.index(name) for name in names]]
-        wanted = Naive(state(JUDGE)).text(words, tags, 22 if cap_len == "published" else length)
-        np.testing.assert_allclose(found[row], wanted, atol=1e-4)
-        np.testing.assert_allclose(guo.with_caption_length(cap_len).texts([CAPTIONS[row]])[0], wanted, atol=1e-4)
+        target = Naive(state(JUDGE)).text(words, tags, 22 if cap_len == "published" else length)
+        np.testing.assert_allclose(points[row], target, atol=1e-4)
+        np.testing.assert_allclose(guo.with_caption_length(cap_len).texts([CAPTIONS[row]])[0], target, atol=1e-4)
 
 
 def test_the_published_caption_length_changes_short_captions_only(guo: GuoEvaluator) -> None:
@@ -225,13 +225,13 @@ def test_one_file_is_the_whole_evaluator(tmp_path: Path) -> None:
     """Published files to one safetensors file, to the same numbers, bit for bit."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        made = read_published(files(tmp_path), card={"licence": "research only"})
-    save_guo(made, tmp_path / "guo.safetensors")
-    found = load_guo(tmp_path / "guo.safetensors")
-    assert found.about == made.about
-    assert found.about["licence"] == "research only"
-    assert np.array_equal(found.motions([motion(61)]), made.motions([motion(61)]))
-    assert np.array_equal(found.texts(CAPTIONS), made.texts(CAPTIONS))
+        evaluator = read_published(files(tmp_path), card={"licence": "research only"})
+    save_guo(evaluator, tmp_path / "guo.safetensors")
+    copy = load_guo(tmp_path / "guo.safetensors")
+    assert copy.about == evaluator.about
+    assert copy.about["licence"] == "research only"
+    assert np.array_equal(copy.motions([motion(61)]), evaluator.motions([motion(61)]))
+    assert np.array_equal(copy.texts(CAPTIONS), evaluator.texts(CAPTIONS))
     assert load_guo(tmp_path / "finest.tar", cap_len="published").cap_len == "published"
     assert is_guo(tmp_path / "guo.safetensors")
     assert is_guo(tmp_path / "finest.tar")
@@ -243,11 +243,11 @@ def test_one_file_is_the_whole_evaluator(tmp_path: Path) -> None:
 
 def test_an_evaluator_without_words_or_statistics_is_kept_as_it_is(tmp_path: Path) -> None:
     torch.save(checkpoint(state(JUDGE)), tmp_path / "finest.tar")
-    made = load_guo(save_guo(read_published(tmp_path / "finest.tar"), tmp_path / "guo.safetensors"))
-    assert made.mean is None
-    assert made.words is None
+    evaluator = load_guo(save_guo(read_published(tmp_path / "finest.tar"), tmp_path / "guo.safetensors"))
+    assert evaluator.mean is None
+    assert evaluator.words is None
     with pytest.raises(MotionloomError, match="suffix"):
-        save_guo(made, tmp_path / "guo.tar")
+        save_guo(evaluator, tmp_path / "guo.tar")
 
 
 def test_the_data_sets_statistics_and_missing_lists_are_warned_of(tmp_path: Path) -> None:
@@ -256,8 +256,8 @@ def test_the_data_sets_statistics_and_missing_lists_are_warned_of(tmp_path: Path
     std[[0, 1, 2, 3, 259, 260, 261, 262]] *= 25
     np.save(tmp_path / "Std.npy", std)
     with pytest.warns(UserWarning, match="t2m_std"):
-        made = read_published(path, std=tmp_path / "Std.npy")
-    assert "weighs 1 times" in made.about["statistics"]
+        evaluator = read_published(path, std=tmp_path / "Std.npy")
+    assert "weighs 1 times" in evaluator.about["statistics"]
     (tmp_path / "word_vectorizer.py").unlink()
     with pytest.warns(UserWarning, match="special words"):
         assert "not the published input" in read_published(path).about["words"]

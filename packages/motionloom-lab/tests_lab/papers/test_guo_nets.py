@@ -31,10 +31,10 @@ def table(sizes: GuoSizes = SMALL) -> dict[str, tuple[int, ...]]:
         "text_encoder.pos_emb.weight": (s.word, s.tags),
         "text_encoder.pos_emb.bias": (s.word,),
     }
-    for part, given_, inner in (("text", s.word, s.text), ("motion", s.snippet, s.motion)):
+    for part, width, inner in (("text", s.word, s.text), ("motion", s.snippet, s.motion)):
         own: dict[str, tuple[int, ...]] = {
             "hidden": (2, 1, inner),
-            "input_emb.weight": (inner, given_),
+            "input_emb.weight": (inner, width),
             "input_emb.bias": (inner,),
             "output_net.0.weight": (inner, 2 * inner),
             "output_net.0.bias": (inner,),
@@ -53,13 +53,13 @@ def table(sizes: GuoSizes = SMALL) -> dict[str, tuple[int, ...]]:
 def state(sizes: GuoSizes = SMALL, seed: int = 0) -> dict[str, Tensor]:
     """Weights of the published form; every one matters, and each sum stays near one, so that rounding stays small."""
     generator = torch.Generator().manual_seed(seed)
-    made = {}
+    tensors = {}
     for key, shape in table(sizes).items():
         summed = math.prod(shape[1:]) if key.endswith("weight") and len(shape) > 1 else 4
-        made[key] = torch.randn(shape, generator=generator) / summed**0.5
+        tensors[key] = torch.randn(shape, generator=generator) / summed**0.5
         if key.endswith("output_net.1.weight"):
-            made[key] += 1
-    return made
+            tensors[key] += 1
+    return tensors
 
 
 class Naive:
@@ -111,7 +111,7 @@ class Naive:
         return self.sequence("text_encoder", tagged[:length])
 
 
-def drawn(rows: int, frames: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
+def random_inputs(rows: int, frames: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
     """Frames, word vectors and one-hot parts of speech."""
     generator = torch.Generator().manual_seed(seed)
     return (
@@ -123,40 +123,40 @@ def drawn(rows: int, frames: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_both_encoders_are_the_loop_over_time(seed: int) -> None:
-    weights, (frames, words, tags) = state(seed=seed), drawn(5, 44, seed)
+    weights, (frames, words, tags) = state(seed=seed), random_inputs(5, 44, seed)
     nets, naive = from_state_dict(weights), Naive(weights)
     lengths, counts = [44, 7, 20, 43, 4], [22, 1, 5, 9, 22]
-    found = nets.motions(frames, lengths), nets.texts(words, tags, counts)
+    points = nets.motions(frames, lengths), nets.texts(words, tags, counts)
     for row in range(5):
         moved = naive.motion(frames[row].double().numpy(), lengths[row])
-        said = naive.text(words[row].double().numpy(), tags[row].double().numpy(), counts[row])
-        np.testing.assert_allclose(found[0][row].numpy(), moved, atol=2e-5)
-        np.testing.assert_allclose(found[1][row].numpy(), said, atol=2e-5)
+        sentences = naive.text(words[row].double().numpy(), tags[row].double().numpy(), counts[row])
+        np.testing.assert_allclose(points[0][row].numpy(), moved, atol=2e-5)
+        np.testing.assert_allclose(points[1][row].numpy(), sentences, atol=2e-5)
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 1000), st.permutations(range(4)), st.lists(st.integers(4, 40), min_size=4, max_size=4))
 def test_order_company_and_padding_change_no_row(seed: int, order: list[int], lengths: list[int]) -> None:
     """A row alone, in any place of a batch, and with other items after its end (frames: from the fourth on)."""
-    frames, words, tags = drawn(4, 48, seed)
+    frames, words, tags = random_inputs(4, 48, seed)
     nets, counts = from_state_dict(state()), [min(n, 22) for n in lengths]
-    moved, said = nets.motions(frames, lengths), nets.texts(words, tags, counts)
+    moved, sentences = nets.motions(frames, lengths), nets.texts(words, tags, counts)
     assert torch.allclose(nets.motions(frames[order], [lengths[i] for i in order]), moved[order], atol=1e-5)
     for row, (length, count) in enumerate(zip(lengths, counts, strict=True)):
         one, sentence = frames[row : row + 1].clone(), words[row : row + 1].clone()
         one[:, length // 4 * 4 + 3 :] = 1e3
         sentence[:, count:] = 1e3
         assert torch.allclose(nets.motions(one, [length])[0], moved[row], atol=1e-5)
-        assert torch.allclose(nets.texts(sentence, tags[row : row + 1], [count])[0], said[row], atol=1e-5)
+        assert torch.allclose(nets.texts(sentence, tags[row : row + 1], [count])[0], sentences[row], atol=1e-5)
 
 
 def test_lengths_are_whole_snippets_and_every_item_before_the_end_counts() -> None:
-    frames, words, tags = drawn(1, 40, 0)
+    frames, words, tags = random_inputs(1, 40, 0)
     nets = from_state_dict(state())
-    moved, said = nets.motions(frames, [23]), nets.texts(words, tags, [9])
+    moved, sentences = nets.motions(frames, [23]), nets.texts(words, tags, [9])
     assert torch.equal(nets.motions(frames, [20]), moved)
     assert not torch.allclose(nets.motions(frames, [24]), moved, atol=1e-3)
-    assert not torch.allclose(nets.texts(words, tags, [10]), said, atol=1e-3)
+    assert not torch.allclose(nets.texts(words, tags, [10]), sentences, atol=1e-3)
     for at in (0, 19):
         other = frames.clone()
         other[:, at] += 1
@@ -225,9 +225,9 @@ def checkpoint(weights: dict[str, Tensor] | None = None) -> dict[str, object]:
 def test_a_checkpoint_is_read_whole_and_without_its_optimisers(tmp_path: Path, zipped: bool) -> None:
     path = tmp_path / "finest.tar"
     torch.save(checkpoint(), path, _use_new_zipfile_serialization=zipped)
-    found = read_guo(path)
-    assert found.keys() == state().keys()
-    assert all(torch.equal(found[key], value) for key, value in state().items())
+    weights = read_guo(path)
+    assert weights.keys() == state().keys()
+    assert all(torch.equal(weights[key], value) for key, value in state().items())
 
 
 @pytest.mark.parametrize(

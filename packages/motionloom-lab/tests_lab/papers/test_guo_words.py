@@ -55,11 +55,11 @@ def words(tmp_path: Path) -> Words:
 
 @pytest.mark.parametrize("protocol", [2, 3, 4, 5])
 def test_each_word_has_the_vector_that_the_index_gives_it(tmp_path: Path, protocol: int) -> None:
-    found = read_words(published(tmp_path, protocol=protocol))
-    assert found.names == tuple(NAMES)
-    assert found.vectors.dtype == np.float32
-    assert found.vectors[:, 0].tolist() == [5, 4, 3, 2, 1, 0]
-    assert found.special is None
+    words = read_words(published(tmp_path, protocol=protocol))
+    assert words.names == tuple(NAMES)
+    assert words.vectors.dtype == np.float32
+    assert words.vectors[:, 0].tolist() == [5, 4, 3, 2, 1, 0]
+    assert words.special is None
 
 
 @pytest.mark.parametrize(
@@ -93,11 +93,11 @@ def test_a_token_without_its_part_of_speech_is_reported(words: Words) -> None:
 
 @pytest.mark.parametrize(("count", "length"), [(0, 2), (3, 5), (19, 21), (20, 22), (21, 22), (60, 22)])
 def test_a_caption_is_22_items_of_which_sos_and_eos_count(count: int, length: int) -> None:
-    given_ = [f"w{i}/NOUN" for i in range(count)]
-    items, found = padded(given_)
+    tokens = [f"w{i}/NOUN" for i in range(count)]
+    items, found = padded(tokens)
     assert (len(items), found) == (22, length)
     assert items[0] == "sos/OTHER"
-    assert items[1 : length - 1] == given_[:20]
+    assert items[1 : length - 1] == tokens[:20]
     assert items[length - 1] == "eos/OTHER"
     assert set(items[length:]) <= {"unk/OTHER"}
 
@@ -111,8 +111,8 @@ def test_the_parts_of_speech_are_in_the_published_order() -> None:
 def test_plain_glove_text_is_read_too(tmp_path: Path) -> None:
     path = tmp_path / "glove.6B.3d.txt"
     path.write_text("".join(f"{word} {i} 0.5 -1e-2\n" for i, word in enumerate(NAMES)), encoding="utf-8")
-    found = read_words(path)
-    assert found.look_up("left/ADJ")[0].tolist() == pytest.approx([4, 0.5, -0.01])
+    words = read_words(path)
+    assert words.look_up("left/ADJ")[0].tolist() == pytest.approx([4, 0.5, -0.01])
 
 
 @pytest.mark.parametrize(
@@ -196,16 +196,16 @@ def test_damaged_bytes_are_a_mistake_and_nothing_else(
         path = tmp_path_factory.mktemp("damaged") / "a.pkl"
         path.write_bytes(attempt)
         try:
-            found = read_flat(path)
+            value = read_flat(path)
         except MotionloomError:
             continue
-        assert isinstance(found, list | dict)
+        assert isinstance(value, list | dict)
 
 
 def itself() -> list:
-    found: list = []
-    found.append(found)
-    return found
+    result: list = []
+    result.append(result)
+    return result
 
 
 @pytest.mark.parametrize(

@@ -110,16 +110,16 @@ def test_without_completion_the_observation_has_no_say() -> None:
 
 def test_part_control_holds_a_part_in_all_frames_and_shares_its_noise() -> None:
     motion = some(1, 20, 48)
-    made = complete(motion[:, :5], 3, fixed=Fixed(motion, PARTS["left_arm"]))[1]
+    places = complete(motion[:, :5], 3, fixed=Fixed(motion, PARTS["left_arm"]))[1]
     held = slice(30, 39)  # the published channels 3 * 10 to 3 * 12 + 3
     np.testing.assert_allclose(
-        made[..., held], np.broadcast_to(motion, (3, *motion.shape[1:]))[..., held], atol=0.05, rtol=0
+        places[..., held], np.broadcast_to(motion, (3, *motion.shape[1:]))[..., held], atol=0.05, rtol=0
     )
-    assert np.array_equal(made[0, ..., held], made[1, ..., held])
+    assert np.array_equal(places[0, ..., held], places[1, ..., held])
     free = np.ones((48,), dtype=np.bool_)
     free[held] = False
-    assert float(np.abs(made[:, 5:, free]).max()) < 0.1
-    assert not np.array_equal(made[0, 5:, free], made[1, 5:, free])
+    assert float(np.abs(places[:, 5:, free]).max()) < 0.1
+    assert not np.array_equal(places[0, 5:, free], places[1, 5:, free])
 
 
 def test_parts_are_the_published_ranges() -> None:
@@ -129,11 +129,11 @@ def test_parts_are_the_published_ranges() -> None:
 @pytest.mark.parametrize("relax", [0, 0.0, 0.2, 5, 1.0, 10, 99])
 def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
     """Counted by draws: the start, one per step, and one for the target in the steps before the last ones."""
-    drawn = 0
+    calls = 0
 
     def draw(like: np.ndarray) -> np.ndarray:
-        nonlocal drawn
-        drawn += 1
+        nonlocal calls
+        calls += 1
         return np.zeros_like(like)
 
     target = SwitchTarget(np.ones((1, 4, 48), np.float32), relax)
@@ -148,7 +148,7 @@ def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
         target=target,
     )
     imposed = max(10 - (relax if isinstance(relax, int) else round(10 * relax)), 0)
-    assert drawn == 1 + 10 + imposed
+    assert calls == 1 + 10 + imposed
     assert bool(imposed) == (float(motion[:, -4:].mean()) > 1e-3)
     if imposed == 10:
         np.testing.assert_allclose(motion[:, -4:], np.ones((2, 4, 48), np.float32), atol=1e-3, rtol=0)
@@ -178,61 +178,61 @@ def test_the_published_coin_falls_as_often_as_asked() -> None:
 # Futures of a predictor
 
 
-def pasts(made: Predictor, windows: int = 3, seed: int = 0) -> np.ndarray:
+def pasts(model: Predictor, windows: int = 3, seed: int = 0) -> np.ndarray:
     rng = np.random.default_rng(seed)
-    steps = 0.05 * rng.normal(size=(windows, made.observed, made.layout.joints, 3)).cumsum(axis=1)
-    return rng.normal(size=(windows, 1, made.layout.joints, 3)) + steps
+    steps = 0.05 * rng.normal(size=(windows, model.observed, model.layout.joints, 3)).cumsum(axis=1)
+    return rng.normal(size=(windows, 1, model.layout.joints, 3)) + steps
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_futures_have_their_shape_and_come_again(variant: str) -> None:
-    made = predictor(variant)
-    first, again = (published_futures(made, pasts(made), count=2, seed=5, steps=4) for _ in range(2))
+    model = predictor(variant)
+    first, again = (published_futures(model, pasts(model), count=2, seed=5, steps=4) for _ in range(2))
     assert first.shape == (3, 2, 15, 4, 3)
     np.testing.assert_array_equal(first, again)
     assert np.abs(first[:, 0] - first[:, 1]).max() > 0.01
-    assert np.abs(first - published_futures(made, pasts(made), count=2, seed=6, steps=4)).max() > 0.01
+    assert np.abs(first - published_futures(model, pasts(model), count=2, seed=6, steps=4)).max() > 0.01
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_future_does_not_depend_on_the_others(variant: str) -> None:
     """Neither on how many rows go at a time, nor on the later windows and samples."""
-    made = predictor(variant)
-    whole = published_futures(made, pasts(made), count=4, seed=5, steps=4, told_share=0.5)
+    model = predictor(variant)
+    whole = published_futures(model, pasts(model), count=4, seed=5, steps=4, told_share=0.5)
     np.testing.assert_allclose(
-        published_futures(made, pasts(made), count=4, seed=5, steps=4, told_share=0.5, rows=5), whole, atol=1e-4
+        published_futures(model, pasts(model), count=4, seed=5, steps=4, told_share=0.5, rows=5), whole, atol=1e-4
     )
-    fewer = published_futures(made, pasts(made)[:2], count=2, seed=5, steps=4)
+    fewer = published_futures(model, pasts(model)[:2], count=2, seed=5, steps=4)
     np.testing.assert_allclose(fewer, whole[:2, :2], atol=1e-4)
 
 
-def oracle(made: Predictor, answer: Callable[[np.ndarray], np.ndarray]) -> Predictor:
+def oracle(model: Predictor, answer: Callable[[np.ndarray], np.ndarray]) -> Predictor:
     """A predictor whose network names what it is answered by the clean state of all rows, as its variant asks."""
 
     class Perfect(TransLinear):
         def forward(
-            self, x: np.ndarray, t: np.ndarray, told: np.ndarray | None = None, keep: np.ndarray | None = None
+            self, x: np.ndarray, t: np.ndarray, condition: np.ndarray | None = None, keep: np.ndarray | None = None
         ) -> np.ndarray:
             clean = answer(x)
-            if made.variant == "masked":
+            if model.variant == "masked":
                 return clean
-            a, b = made.schedule.at(int(t[0]) + 1)
+            a, b = model.schedule.at(int(t[0]) + 1)
             return (x - a * clean) / b
 
-    return replace(made, net=Perfect(made.net.config).eval())
+    return replace(model, net=Perfect(model.net.config).eval())
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_perfect_guess_gives_the_true_future_but_for_the_noise_that_is_left(variant: str) -> None:
     """With every frequency kept, so that mixing loses nothing; without the root's way it stays where it was seen."""
-    made = predictor(variant, kept=20)
-    world = pasts(replace(made, observed=20), 1)
-    if not made.layout.root:
+    model = predictor(variant, kept=20)
+    world = pasts(replace(model, observed=20), 1)
+    if not model.layout.root:
         world += world[:, 4:5, :1] - world[:, :, :1]
-    own = np.asarray(made.layout.encode(world, made.layout.place(world[:, 4]))).astype(np.float32)
-    clean = made.to_state(own, own[:, 4])
+    own = np.asarray(model.layout.encode(world, model.layout.place(world[:, 4]))).astype(np.float32)
+    clean = model.to_state(own, own[:, 4])
     futures = published_futures(
-        oracle(made, lambda x: np.broadcast_to(clean, x.shape)), world[:, :5], count=3, steps=20
+        oracle(model, lambda x: np.broadcast_to(clean, x.shape)), world[:, :5], count=3, steps=20
     )
     off = futures - world[:, None, 5:]
     assert np.abs(off).max() < 0.06
@@ -241,45 +241,53 @@ def test_a_perfect_guess_gives_the_true_future_but_for_the_noise_that_is_left(va
 
 def test_the_published_manner_is_the_sampler_on_plain_tensors() -> None:
     """One row: the recorded runs hold for `published_completion`, and so for what predictors go through."""
-    made, h = predictor("published"), 5
-    past = pasts(made, 1)
-    numbers = np.asarray(made.layout.encode(past, made.layout.place(past[:, -1]))).astype(np.float32)
-    told = made.basis.to_spectrum(padded(numbers, made.frames))
+    model, h = predictor("published"), 5
+    past = pasts(model, 1)
+    numbers = np.asarray(model.layout.encode(past, model.layout.place(past[:, -1]))).astype(np.float32)
+    condition = model.basis.to_spectrum(padded(numbers, model.frames))
     seed = int(np.random.SeedSequence((7, 0, 0)).generate_state(1, np.uint64)[0] >> np.uint64(1))
     expected = published_completion(
-        made.denoiser(told), numbers, 1, basis=made.basis, schedule=made.schedule, noise=row_noise([seed]), steps=6
+        model.denoiser(condition),
+        numbers,
+        1,
+        basis=model.basis,
+        schedule=model.schedule,
+        noise=row_noise([seed]),
+        steps=6,
     )[1][:, h:]
-    futures = published_futures(made, past, count=1, seed=7, steps=6)[:, 0]
-    found = made.layout.encode(futures, made.layout.place(past[:, -1]))
-    np.testing.assert_allclose(found, expected, atol=1e-4)
+    futures = published_futures(model, past, count=1, seed=7, steps=6)[:, 0]
+    features = model.layout.encode(futures, model.layout.place(past[:, -1]))
+    np.testing.assert_allclose(features, expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_network_is_called_once_per_step_and_rows_are_conditioned_as_asked(variant: str) -> None:
-    made, calls = predictor(variant), []
+    model, calls = predictor(variant), []
 
     class Spy(TransLinear):
         def forward(
-            self, x: np.ndarray, t: np.ndarray, told: np.ndarray | None = None, keep: np.ndarray | None = None
+            self, x: np.ndarray, t: np.ndarray, condition: np.ndarray | None = None, keep: np.ndarray | None = None
         ) -> np.ndarray:
-            calls.append((len(x), None if told is None else len(told), None if keep is None else keep.tolist()))
+            calls.append(
+                (len(x), None if condition is None else len(condition), None if keep is None else keep.tolist())
+            )
             return np.zeros_like(x)
 
-    spy = replace(made, net=Spy(made.net.config).eval())
-    published_futures(spy, pasts(made, 2), count=4, steps=6, told_share=0.5)
+    spy = replace(model, net=Spy(model.net.config).eval())
+    published_futures(spy, pasts(model, 2), count=4, steps=6, told_share=0.5)
     assert calls == [(8, 8, [True, True, False, False] * 2)] * 6
     calls.clear()
-    published_futures(spy, pasts(made, 2), count=4, steps=6)
+    published_futures(spy, pasts(model, 2), count=4, steps=6)
     assert calls == [(8, 8, None)] * 6
     calls.clear()
-    published_futures(spy, pasts(made, 2), count=4, steps=6, told_share=0.0, rows=5)
+    published_futures(spy, pasts(model, 2), count=4, steps=6, told_share=0.0, rows=5)
     assert [call[:2] for call in calls] == [(5, None)] * 6 + [(3, None)] * 6
 
 
 @pytest.mark.parametrize("how", ["short", "long", "joints", "nan", "flat"])
 def test_pasts_that_do_not_fit_are_refused(how: str) -> None:
-    made = predictor()
-    past = pasts(made)
+    model = predictor()
+    past = pasts(model)
     broken = past.copy()
     broken[0, 0, 0, 0] = np.nan
     wrong = {
@@ -290,18 +298,18 @@ def test_pasts_that_do_not_fit_are_refused(how: str) -> None:
         "flat": past[0],
     }
     with pytest.raises(MotionloomError, match="past"):
-        published_futures(made, wrong[how], count=1, steps=2)
+        published_futures(model, wrong[how], count=1, steps=2)
 
 
 @pytest.mark.parametrize("wrong", [{"count": 0}, {"count": 1, "rows": 0}], ids=str)
 def test_no_futures_are_refused(wrong: dict) -> None:
-    made = predictor()
+    model = predictor()
     with pytest.raises(MotionloomError, match="at least one"):
-        published_futures(made, pasts(made), steps=2, **wrong)
+        published_futures(model, pasts(model), steps=2, **wrong)
 
 
 def test_a_schedule_of_few_levels_has_no_hundred_steps() -> None:
-    made = predictor()
+    model = predictor()
     short: Schedule = cosine(50)
     with pytest.raises(MotionloomError, match="steps"):
-        published_futures(replace(made, schedule=short), pasts(made), count=1)
+        published_futures(replace(model, schedule=short), pasts(model), count=1)

@@ -35,20 +35,20 @@ def test_a_published_checkpoint_is_a_predictor_of_its_data_set(
     tmp_path: Path, channels: int, kept: int, layout: object, fps: float, observed: int, frames: int
 ) -> None:
     path = checkpoint(tmp_path, channels, kept)
-    made = import_humanmac(path, licence="research only")
-    assert (made.layout, made.fps, made.observed, made.frames, made.variant) == (
+    predictor = import_humanmac(path, licence="research only")
+    assert (predictor.layout, predictor.fps, predictor.observed, predictor.frames, predictor.variant) == (
         layout,
         fps,
         observed,
         frames,
         "published",
     )
-    assert (made.card.name, made.card.licence) == ("ckpt_ema_550", "research only")
-    assert (made.schedule.name, made.schedule.steps) == ("cosine", 1000)
+    assert (predictor.card.name, predictor.card.licence) == ("ckpt_ema_550", "research only")
+    assert (predictor.schedule.name, predictor.schedule.steps) == ("cosine", 1000)
     state = torch.load(path, weights_only=True)
     assert is_humanmac(state)
-    assert all(np.array_equal(made.net.weights[f"net.{key}"], value.numpy()) for key, value in state.items())
-    back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors"))
+    assert all(np.array_equal(predictor.net.weights[f"net.{key}"], value.numpy()) for key, value in state.items())
+    back = Predictor.load(save_predictor(predictor, tmp_path / "a.safetensors"))
     assert (back.layout, back.frames, back.variant) == (layout, frames, "published")
 
 

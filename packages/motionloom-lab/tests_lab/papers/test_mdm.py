@@ -210,17 +210,17 @@ def test_missing_options_are_assumed_aloud_and_unknown_ones_ignored(tmp_path: Pa
     read = read_published(
         write(tmp_path, state(), {"noise_schedule": "linear", "diffusion_steps": 50, "emb_before_mask": 1})
     )
-    said = describe(read, from_published(read.state))
-    assert (said.schedule, said.steps) == ("linear", 50)
-    assert len(said.warnings) == 1
-    assert "arch" in said.warnings[0]
+    about = describe(read, from_published(read.state))
+    assert (about.schedule, about.steps) == ("linear", 50)
+    assert len(about.warnings) == 1
+    assert "arch" in about.warnings[0]
 
 
 def test_without_options_the_published_defaults_hold(tmp_path: Path) -> None:
     read = read_published(write(tmp_path, state(135)))
-    said = describe(read, from_published(read.state))
-    assert (said.schedule, said.steps, said.data) == ("cosine", 1000, "babel")
-    assert len(said.warnings) == 3
+    about = describe(read, from_published(read.state))
+    assert (about.schedule, about.steps, about.data) == ("cosine", 1000, "babel")
+    assert len(about.warnings) == 3
 
 
 @pytest.mark.parametrize(

@@ -66,22 +66,22 @@ def test_a_silent_output_keeps_the_last_pose_and_a_constant_spectrum_is_scipys()
 
 def test_nearness_is_that_of_a_naive_loop() -> None:
     past = past_of(rows=1, people=2, frames=3)
-    found = _nearness(past).view(1, 2, 2, 3)
+    nearness = _nearness(past).view(1, 2, 2, 3)
     for query in range(2):
         for person in range(2):
             for frame in range(3):
                 squares = ((past[0, query, 2] - past[0, person, frame]) ** 2).sum(-1)
-                assert found[0, query, person, frame] == pytest.approx(float(torch.exp(-squares.mean())))
+                assert nearness[0, query, person, frame] == pytest.approx(float(torch.exp(-squares.mean())))
 
 
 def test_longer_futures_are_said_second_by_second() -> None:
     net, past = net_of(), past_of(frames=8).numpy()
-    made = completed(net, past, 10)
-    assert made.shape == (2, 2, 18, 22, 3)
-    assert np.array_equal(made[:, :, :8], past)
+    future = completed(net, past, 10)
+    assert future.shape == (2, 2, 18, 22, 3)
+    assert np.array_equal(future[:, :, :8], past)
     first = net(torch.from_numpy(past[:, :, 2:]))
-    np.testing.assert_allclose(made[:, :, 8:14], first, atol=1e-6)
-    np.testing.assert_allclose(made[:, :, 14:], net(first)[:, :, :4], atol=1e-5)
+    np.testing.assert_allclose(future[:, :, 8:14], first, atol=1e-6)
+    np.testing.assert_allclose(future[:, :, 14:], net(first)[:, :, :4], atol=1e-5)
     with pytest.raises(MotionloomError, match="completion needs pasts"):
         completed(net, past[:, :, :5], 3)
 
@@ -95,10 +95,10 @@ def test_the_published_sizes() -> None:
 
 def test_windows_are_whole_turned_and_of_one_seed() -> None:
     objective = Seconds(net_of(), [pair_of(40)])
-    drawn = objective.draw(3, 5, 4)
-    assert torch.equal(drawn, objective.draw(3, 5, 4))
-    assert drawn.shape == (4, 2, 24, 22, 3)
-    gone = drawn[:, :, -1, 0] - drawn[:, :, 0, 0]
+    batch = objective.draw(3, 5, 4)
+    assert torch.equal(batch, objective.draw(3, 5, 4))
+    assert batch.shape == (4, 2, 24, 22, 3)
+    gone = batch[:, :, -1, 0] - batch[:, :, 0, 0]
     np.testing.assert_allclose(gone[..., [0, 2]].norm(dim=-1), 23 / 20, atol=1e-5)
     assert (gone[:, 0, 0] - gone[0, 0, 0]).abs().max() > 0.1  # not all the same way
 
@@ -118,15 +118,15 @@ def test_a_network_that_says_the_truth_has_no_loss() -> None:
 
 def test_training_learns_and_the_file_comes_back(tmp_path: Path) -> None:
     pairs = [pair_of(30), pair_of(30, 1), pair_of(30, 2, "val")]
-    said: list[str] = []
-    path = train_mrt(Training(replace(RECIPE, steps=60, batch=4), tmp_path, "cpu", say=said.append), pairs, TINY)
-    found = MrtFile.load(path)
-    objective = Seconds(found.net, pairs[:1])
+    lines: list[str] = []
+    path = train_mrt(Training(replace(RECIPE, steps=60, batch=4), tmp_path, "cpu", say=lines.append), pairs, TINY)
+    copy = MrtFile.load(path)
+    objective = Seconds(copy.net, pairs[:1])
     fresh = Seconds(net_of(), pairs[:1])
-    assert float(objective.loss(found.net, 0, 0, 8)) < 0.5 * float(fresh.loss(fresh.net, 0, 0, 8))
-    assert found.data == "2 train pairs of own"
-    assert found.notes["steps"] == 60
-    assert "2 pairs and their mirror images" in said[0]
+    assert float(objective.loss(copy.net, 0, 0, 8)) < 0.5 * float(fresh.loss(fresh.net, 0, 0, 8))
+    assert copy.data == "2 train pairs of own"
+    assert copy.notes["steps"] == 60
+    assert "2 pairs and their mirror images" in lines[0]
 
 
 def test_what_is_no_such_file_is_reported(tmp_path: Path) -> None:

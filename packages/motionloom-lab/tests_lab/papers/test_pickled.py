@@ -26,13 +26,13 @@ def test_objects_are_read_as_numpy_would(tmp_path: Path, protocol: int, order: A
         "S1": {"a": np.asarray(np.random.default_rng(0).normal(size=(5, 3, 3)), dtype="<f4", order=order)},
         "S2": {"a": np.arange(6, dtype=">f8").reshape(2, 3), "b": np.empty((0, 3)), "c": np.arange(3, dtype=np.int16)},
     }
-    found = read_tables(hostile(tmp_path, pickle.dumps(table, protocol=protocol)), "positions_3d")
-    assert list(found) == list(table)
+    tables = read_tables(hostile(tmp_path, pickle.dumps(table, protocol=protocol)), "positions_3d")
+    assert list(tables) == list(table)
     for subject, actions in table.items():
-        assert list(found[subject]) == list(actions)
+        assert list(tables[subject]) == list(actions)
         for action, array in actions.items():
-            assert found[subject][action].dtype == array.dtype.newbyteorder("=")  # as NumPy's own reader does
-            assert np.array_equal(found[subject][action], array)
+            assert tables[subject][action].dtype == array.dtype.newbyteorder("=")  # as NumPy's own reader does
+            assert np.array_equal(tables[subject][action], array)
 
 
 def test_the_files_of_older_numpy_are_read(tmp_path: Path) -> None:

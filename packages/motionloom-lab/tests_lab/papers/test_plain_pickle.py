@@ -172,14 +172,14 @@ ACTING = {"INST", "OBJ", "NEWOBJ", "NEWOBJ_EX", "EXT1", "EXT2", "EXT4", "PERSID"
 
 
 def test_every_operation_that_finds_or_calls_something_is_refused_by_name():
-    told = {}
+    answers = {}
     for operation in pickletools.opcodes:
         code = operation.code.encode("latin-1")
         with pytest.raises(MotionloomError) as caught:
             read_plain(b"\x80\x04](" + code + b"\x01\x00\x00\x00\x00\x00\x00\x00\n\n" + b"e.", limit=LIMIT)
-        told[operation.name] = str(caught.value)
-    assert told.keys() >= ACTING | KNOWN
-    assert all(f"asks for {name})" in told[name] for name in ACTING)
+        answers[operation.name] = str(caught.value)
+    assert answers.keys() >= ACTING | KNOWN
+    assert all(f"asks for {name})" in answers[name] for name in ACTING)
 
 
 @pytest.mark.parametrize("name", list(HOSTILE))

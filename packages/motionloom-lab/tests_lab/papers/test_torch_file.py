@@ -163,14 +163,14 @@ def tensor_pickle(
 def test_a_tensor_beyond_the_bytes_that_are_there_is_refused(tmp_path: Path, pickled: bytes) -> None:
     good = saved(tmp_path / "a.pt", torch.zeros(2)).read_bytes()
 
-    def put(content: bytes) -> Path:
+    def write(content: bytes) -> Path:
         path = tmp_path / "b.pt"
         path.write_bytes(rezipped(good, lambda members: members.update({"a/data.pkl": content})))
         return path
 
-    assert torch.equal(read_torch_file(put(tensor_pickle(2))), torch.zeros(2))  # type: ignore[arg-type]
+    assert torch.equal(read_torch_file(write(tensor_pickle(2))), torch.zeros(2))  # type: ignore[arg-type]
     with pytest.raises(MotionloomError, match="is not opened"):
-        read_torch_file(put(pickled))
+        read_torch_file(write(pickled))
 
 
 def test_an_old_file_that_claims_more_numbers_than_it_has_is_refused(tmp_path: Path) -> None:

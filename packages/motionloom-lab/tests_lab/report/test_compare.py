@@ -56,8 +56,8 @@ def test_a_difference_counts_beyond_the_root_of_the_squared_intervals(
 def test_towards_the_real_row_is_better_from_either_side(before: float, after: float, verdict: str) -> None:
     """Real is 9: 8 to 8.5 halves the distance, 8.5 to 9.5 keeps it."""
     real = Value(9.0, 0.1, 10)
-    found = cmp.judge(column("real"), Value(before, 0.1, 10), Value(after, 0.1, 10), reals=(real, real))
-    assert found == verdict
+    differences = cmp.judge(column("real"), Value(before, 0.1, 10), Value(after, 0.1, 10), reals=(real, real))
+    assert differences == verdict
 
 
 def test_the_spread_of_the_real_row_counts_too() -> None:
@@ -75,13 +75,13 @@ def test_without_a_real_row_neither_way_is_better() -> None:
 def test_newcombes_own_example() -> None:
     """Newcombe 1998, table II, method 10: 56/70 against 48/80 gives 0.0524 to 0.3339; 9/10 against 3/10, 0.1705 to
     0.8090; 10/10 against 0/10, 0.6075 to 1."""
-    for (a, m), (b, n), wanted in [
+    for (a, m), (b, n), interval in [
         ((56, 70), (48, 80), (0.0524, 0.3339)),
         ((9, 10), (3, 10), (0.1705, 0.8090)),
         ((10, 10), (0, 10), (0.6075, 1.0)),
     ]:
-        found = cmp.newcombe(Value(a / m, count=m), Value(b / n, count=n))
-        assert found == pytest.approx(wanted, abs=6e-5)
+        bounds = cmp.newcombe(Value(a / m, count=m), Value(b / n, count=n))
+        assert bounds == pytest.approx(interval, abs=6e-5)
 
 
 @given(count=st.integers(1, 500), data=st.data())
@@ -107,16 +107,18 @@ def test_equal_models_rarely_differ() -> None:
     is estimated from ten); the planted faults of adding the intervals or of forgetting one leave this range."""
     rng = np.random.default_rng(0)
     draws = rng.normal(size=(2000, 2, 10))
-    found = [cmp.judge(column(), *(Value.of(list(d)) for d in pair), reals=NONE) for pair in draws]
-    assert 0.035 < np.mean([verdict != "same" for verdict in found]) < 0.085
+    verdicts = [cmp.judge(column(), *(Value.of(list(d)) for d in pair), reals=NONE) for pair in draws]
+    assert 0.035 < np.mean([verdict != "same" for verdict in verdicts]) < 0.085
 
 
 def test_rows_are_matched_by_name_and_published_ones_left_out() -> None:
     before, after = report(Value(1.0, 0.1, 5)), report(Value(2.0, 0.1, 5))
     theirs = Row("MDM", {"fid": Value(0.5, 0.1, 5)}, "HumanML3D")
     new = Row("new", {"fid": Value(0.5, 0.1, 5)})
-    found = cmp.compare(replace(before, rows=(*before.rows, theirs)), replace(after, rows=(new, *after.rows, theirs)))
-    assert [(one.row, one.verdict) for one in found] == [("ours", "worse")]
+    differences = cmp.compare(
+        replace(before, rows=(*before.rows, theirs)), replace(after, rows=(new, *after.rows, theirs))
+    )
+    assert [(one.row, one.verdict) for one in differences] == [("ours", "worse")]
 
 
 def test_rows_of_other_weights_are_matched_by_what_follows_their_name() -> None:
@@ -161,9 +163,9 @@ def test_reports_measured_otherwise_are_refused_unless_anyway(after: dict[str, o
     a = replace(report(value), protocol={"batch": 32, **({"judge": {"about": 1}} if "judge" in after else {})})
     suite = str(after.get("suite", "text"))
     b = replace(a, suite=suite, protocol={**a.protocol, **{k: v for k, v in after.items() if k != "suite"}})
-    with pytest.raises(MotionloomError, match="not measured alike") as told:
+    with pytest.raises(MotionloomError, match="not measured alike") as error:
         cmp.compare(a, b)
-    assert said in str(told.value)
+    assert said in str(error.value)
     assert [one.verdict for one in cmp.compare(a, b, anyway=True)] == ["same"]
 
 
@@ -183,8 +185,8 @@ def test_folders_of_releases_and_of_runs_are_read_alike(tmp_path: Path) -> None:
     (tmp_path / "0.1.0" / "text.json").write_text(json.dumps(encode(report(Value(1.0, 0.1, 5)))))
     (tmp_path / "0.1.0" / "realism.json").write_text(json.dumps(encode(report(Value(1.0), suite="realism"))))
     (tmp_path / "run" / "text" / "report.json").write_text(json.dumps(encode(report(Value(2.0, 0.1, 5)))))
-    found, alone = cmp.compare_all(tmp_path / "0.1.0", tmp_path / "run")
-    assert [one.verdict for one in found] == ["worse"]
+    differences, alone = cmp.compare_all(tmp_path / "0.1.0", tmp_path / "run")
+    assert [one.verdict for one in differences] == ["worse"]
     assert alone == ["realism"]
 
 
@@ -194,7 +196,7 @@ def test_an_empty_folder_is_one_sentence(tmp_path: Path) -> None:
 
 
 def test_the_tally_says_how_many_would_leave_by_chance() -> None:
-    found = cmp.compare(report(Value(1.0, 0.1, 5)), report(Value(2.0, 0.1, 5)))
-    said = cmp.tally(found * 20)
-    assert "20 worse and 0 better" in said
-    assert "about 1.0 leave" in said
+    differences = cmp.compare(report(Value(1.0, 0.1, 5)), report(Value(2.0, 0.1, 5)))
+    sentence = cmp.tally(differences * 20)
+    assert "20 worse and 0 better" in sentence
+    assert "about 1.0 leave" in sentence

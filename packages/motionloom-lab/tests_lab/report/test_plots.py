@@ -55,9 +55,9 @@ def test_pictures_are_pictures_and_names_cannot_break_them(tmp_path: Path) -> No
         *rows("$x^{", "\\frac{1}", "a\nb\x00", "名前 5 steps", "名前 9 steps"),
         Row("nan", {"fid": Value(float("nan"))}),
     ]
-    drawn = draw(report(*odd, title="100 % of $ and \\ \n" * 20), tmp_path)
-    assert [path.name for path in drawn] == ["report.png", "steps.png"]
-    for path in drawn:
+    paths = draw(report(*odd, title="100 % of $ and \\ \n" * 20), tmp_path)
+    assert [path.name for path in paths] == ["report.png", "steps.png"]
+    for path in paths:
         with Image.open(path) as picture:
             picture.load()
             assert 200 < picture.width < 4000
@@ -73,12 +73,12 @@ def test_a_larger_number_is_drawn_further_right(tmp_path: Path) -> None:
     """The blue points of two rows: the upper row's number is smaller, so its point is further left."""
     (path,) = draw(report(*rows("small", "large")), tmp_path)
     with Image.open(path) as picture:
-        seen = picture.convert("RGB")
+        pixels = picture.convert("RGB")
         blue = [
             (x, y)
-            for x in range(seen.width)
-            for y in range(seen.height)
-            if (p := seen.getpixel((x, y))) and p[2] > 180 and p[0] < 90  # type: ignore[index]
+            for x in range(pixels.width)
+            for y in range(pixels.height)
+            if (p := pixels.getpixel((x, y))) and p[2] > 180 and p[0] < 90  # type: ignore[index]
         ]
     upper, lower = min(blue, key=lambda p: p[1]), max(blue, key=lambda p: p[1])
     assert upper[1] < lower[1]

@@ -68,14 +68,14 @@ def test_the_table_sets_the_best_and_the_published_rows_apart() -> None:
 
 def test_one_row_of_many_numbers_is_turned() -> None:
     columns = tuple(Column(f"c{k}", f"metric {k}", "up", f"meaning {k}") for k in range(5))
-    shown = markdown(report(Row("machine", {c.name: Value(1.0) for c in columns}), columns=columns))
-    assert "| metric 3 ↑ | 1.000 | meaning 3 |" in shown
+    page = markdown(report(Row("machine", {c.name: Value(1.0) for c in columns}), columns=columns))
+    assert "| metric 3 ↑ | 1.000 | meaning 3 |" in page
 
 
 def test_a_share_shows_what_was_counted() -> None:
-    shown = markdown(report(Row("walk", {"obeyed": Value(0.9, count=10)}), columns=(OBEYED,)))
-    assert "| walk | 0.90 (9/10) |" in shown
-    assert "count" not in shown
+    page = markdown(report(Row("walk", {"obeyed": Value(0.9, count=10)}), columns=(OBEYED,)))
+    assert "| walk | 0.90 (9/10) |" in page
+    assert "count" not in page
 
 
 def test_a_terminal_gets_no_control_characters() -> None:
@@ -117,22 +117,22 @@ _PLAIN = st.recursive(
 @settings(max_examples=60, deadline=None)
 def test_any_report_survives_json_and_can_be_shown(rows: list[Row], protocol: dict[str, object]) -> None:
     one = replace(report(*rows), protocol=protocol)
-    found = decode(json.loads(json.dumps(encode(one), allow_nan=False)))
-    assert found == one
-    assert markdown(found).startswith("# Text")
-    assert plain(found)
+    copy = decode(json.loads(json.dumps(encode(one), allow_nan=False)))
+    assert copy == one
+    assert markdown(copy).startswith("# Text")
+    assert plain(copy)
 
 
 GOOD = encode(WHOLE)
 
 
 def _damaged(path: tuple[str | int, ...], value: object) -> dict[str, object]:
-    found = json.loads(json.dumps(GOOD))
-    inner = found
+    data = json.loads(json.dumps(GOOD))
+    inner = data
     for key in path[:-1]:
         inner = inner[key]
     inner[path[-1]] = value
-    return found
+    return data
 
 
 @pytest.mark.parametrize(
@@ -165,10 +165,10 @@ def test_a_damaged_report_is_one_sentence_that_names_the_file(
 ) -> None:
     file = tmp_path / "report.json"
     file.write_text(json.dumps(_damaged(path, value)))
-    with pytest.raises(MotionloomError, match="is not a report") as told:
+    with pytest.raises(MotionloomError, match="is not a report") as error:
         read(file)
-    assert str(file) in str(told.value)
-    assert "\n" not in str(told.value)
+    assert str(file) in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("text", ["", "null", "[]", '{"format": 1', '{"format": NaN}', "[" * 100_000, '"\ud800"'])
@@ -199,7 +199,7 @@ def test_any_json_in_place_of_a_part_is_read_or_refused(
     file = tmp_path_factory.mktemp("found") / "report.json"
     file.write_text(json.dumps({**GOOD, key: value}))
     try:
-        told = str(file) if isinstance(read(file), Report) else ""
+        message = str(file) if isinstance(read(file), Report) else ""
     except MotionloomError as error:
-        told = str(error)
-    assert str(file) in told
+        message = str(error)
+    assert str(file) in message

@@ -20,8 +20,8 @@ def couple(seconds: float, apart: float = 1.0, speed: float = 1.0) -> np.ndarray
     return np.stack([one, one + np.array([apart, 0.0, 0.0])])
 
 
-def pair_of(positions: np.ndarray, name: str = "p", split: str = "val", said: Sequence[str] = ()) -> Pair:
-    return Pair(name, split, tuple(said), "own", "do what you like", positions)
+def pair_of(positions: np.ndarray, name: str = "p", split: str = "val", captions: Sequence[str] = ()) -> Pair:
+    return Pair(name, split, tuple(captions), "own", "do what you like", positions)
 
 
 def block_over(prior) -> PairBlock:

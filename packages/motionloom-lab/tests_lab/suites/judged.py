@@ -22,15 +22,15 @@ def place(k: int) -> np.ndarray:
 
 
 def features(where: np.ndarray, frames: int) -> np.ndarray:
-    found = np.zeros((frames, 263))
-    found[:, HIDDEN] = where
-    return found
+    numbers = np.zeros((frames, 263))
+    numbers[:, HIDDEN] = where
+    return numbers
 
 
 def item(k: int, frames: int = 40, *, captions: int = 2, says: int | None = None) -> Item:
     number = k if says is None else says
-    said = tuple(Caption(f"person {number} walks, wording {w}.") for w in range(captions))
-    return Item(f"item{k:04d}", "cmu", "test", said, features(place(k), frames))
+    texts = tuple(Caption(f"person {number} walks, wording {w}.") for w in range(captions))
+    return Item(f"item{k:04d}", "cmu", "test", texts, features(place(k), frames))
 
 
 def number_in(text: str) -> int:

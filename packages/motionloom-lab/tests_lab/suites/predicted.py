@@ -61,7 +61,7 @@ def waving(frames: int, speed: float = 1.0, phase: float = 0.0) -> np.ndarray:
 def protocol(takes: int = 3, frames: int = 60, *, name: str = "own") -> Protocol:
     """A data set of people who wave at other speeds; all splits have some."""
     splits = ("train", "val", "test")
-    found = tuple(
+    recordings = tuple(
         Recording(
             f"{split}{k}",
             f"s{k}",
@@ -72,7 +72,7 @@ def protocol(takes: int = 3, frames: int = 60, *, name: str = "own") -> Protocol
         for n, split in enumerate(splits)
         for k in range(takes)
     )
-    return Protocol(name, FPS, SEEN, AHEAD, SMPL_LAYOUT, found, "made up")
+    return Protocol(name, FPS, SEEN, AHEAD, SMPL_LAYOUT, recordings, "made up")
 
 
 def predictor(

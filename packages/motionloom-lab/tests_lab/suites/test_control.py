@@ -17,7 +17,16 @@ from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.report import report
 from motionloom_lab.suites import control, control_kinds
 from motionloom_lab.suites.control_kinds import Kind, Target, kind
-from motionloom_lab.suites.control_methods import BASE, EXPORTED, METHODS, OURS, UNCONTROLLED, Made, groups, of_motion
+from motionloom_lab.suites.control_methods import (
+    BASE,
+    EXPORTED,
+    METHODS,
+    OURS,
+    UNCONTROLLED,
+    Track,
+    groups,
+    of_motion,
+)
 from motionloom_lab.suites.harness import Parts, Run, physical_mean
 from motionloom_lab.suites.items import Item
 from motionloom_lab.suites.protocol import Selection
@@ -47,18 +56,18 @@ def walker(k: int) -> Item:
 
 
 ITEMS = [walker(k) for k in range(6)]
-Way = Callable[[Target, int], Made]
+Way = Callable[[Target, int], Track]
 
 
-def perfect(target: Target, seed: int) -> Made:
-    return Made(humanml.decode_positions(target.known), target.known)
+def perfect(target: Target, seed: int) -> Track:
+    return Track(humanml.decode_positions(target.known), target.known)
 
 
-def stubborn(target: Target, seed: int) -> Made:
+def stubborn(target: Target, seed: int) -> Track:
     """Walks straight ahead whatever is asked, a bit shakily."""
     positions = walking(1.0, len(target) / FPS + 0.2)[: len(target)]
     positions = positions + 0.002 * np.random.default_rng(seed).standard_normal(positions.shape)
-    return Made(positions, target.known)
+    return Track(positions, target.known)
 
 
 class Fakes:
@@ -73,7 +82,7 @@ class Fakes:
             raise MotionloomError("there is no such adapter")
         way = stubborn if name in BASE.values() else self.controlled
 
-        def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
+        def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Track]:
             if self.stop_after is not None and len(self.calls) >= self.stop_after:
                 raise KeyboardInterrupt
             self.calls.append((one.name, name, tuple(seeds)))
@@ -86,37 +95,37 @@ def trial(fakes: Fakes) -> control.ControlTrial:
     return control.prepare(ITEMS, Judge(), fakes, SMALL, scale=np.ones(263), selection=Selection())
 
 
-def values(found: report.Report, row: str) -> dict[str, float]:
-    kept = found.row(row)
-    assert kept is not None, [r.name for r in found.rows]
-    return {name: value.mean for name, value in kept.values.items()}
+def values(results: report.Report, row: str) -> dict[str, float]:
+    line = results.row(row)
+    assert line is not None, [r.name for r in results.rows]
+    return {name: value.mean for name, value in line.values.items()}
 
 
 @pytest.mark.parametrize("name", control_kinds.DEFAULT)
 def test_a_perfect_controller_has_no_error_and_fails_nowhere(name: str) -> None:
     one = kind(name)
     targets = [control_kinds.target_of(one, item.features, "walks") for item in ITEMS]
-    found = control.met([perfect(target, 0) for target in targets], targets, np.ones(263))
-    assert found
-    assert max(found.values()) == pytest.approx(0, abs=1e-6)
+    errors = control.met([perfect(target, 0) for target in targets], targets, np.ones(263))
+    assert errors
+    assert max(errors.values()) == pytest.approx(0, abs=1e-6)
 
 
 def test_who_ignores_the_goal_has_the_error_of_a_loop() -> None:
     targets = [control_kinds.target_of(kind("trajectory+left_wrist"), item.features, "walks") for item in ITEMS]
-    made = [stubborn(target, 3) for target in targets]
-    found = control.met(made, targets, np.ones(263))
+    tracks = [stubborn(target, 3) for target in targets]
+    errors = control.met(tracks, targets, np.ones(263))
     root, joint = [], []
-    for one, item in zip(made, ITEMS, strict=True):
+    for one, item in zip(tracks, ITEMS, strict=True):
         real = humanml.decode_positions(item.features)
         for t in range(len(real)):
             root.append(np.hypot(*(one.positions[t, 0] - real[t, 0])[[0, 2]]))
             joint.append(np.linalg.norm(one.positions[t, WRIST] - real[t, WRIST]))
-    assert found["root_error"] == pytest.approx(100 * np.mean(root))
-    assert found["joint_error"] == pytest.approx(100 * np.mean(joint))
+    assert errors["root_error"] == pytest.approx(100 * np.mean(root))
+    assert errors["joint_error"] == pytest.approx(100 * np.mean(joint))
     both = np.array(root + joint)
-    assert found["beyond_20"] == pytest.approx((both > 0.2).mean())
-    assert found["beyond_50"] == pytest.approx((both > 0.5).mean())
-    assert found["worst"] == pytest.approx(100 * both.max())
+    assert errors["beyond_20"] == pytest.approx((both > 0.2).mean())
+    assert errors["beyond_50"] == pytest.approx((both > 0.5).mean())
+    assert errors["worst"] == pytest.approx(100 * both.max())
 
 
 def test_where_a_goal_faces_is_where_its_features_say() -> None:
@@ -147,8 +156,8 @@ def test_a_kind_asks_for_so_many_places_and_fixes_so_many_numbers(name: str, pai
 
 def test_keyframes_are_whole_seconds_and_in_between_leaves_the_middle() -> None:
     assert np.flatnonzero(kind("keyframes").frames(70)).tolist() == [20, 40, 60]
-    given = np.flatnonzero(kind("in_between").frames(100))
-    assert given.tolist() == [*range(20), *range(80, 100)]
+    frames = np.flatnonzero(kind("in_between").frames(100))
+    assert frames.tolist() == [*range(20), *range(80, 100)]
     assert np.flatnonzero(kind("in_between").frames(40)).tolist() == [*range(10), *range(30, 40)]
 
 
@@ -167,9 +176,11 @@ def test_a_joint_without_the_trajectory_is_asked_in_the_world_and_its_path_is_no
 
 
 def test_titles_are_those_of_the_published_rows() -> None:
-    found = control.measure(trial(Fakes()), control_kinds.kinds(["trajectory", "left_wrist", "trajectory+left_wrist"]))
-    published = {row.name for row in found.rows if row.measured_on}
-    here = {row.name for row in found.rows if not row.measured_on}
+    results = control.measure(
+        trial(Fakes()), control_kinds.kinds(["trajectory", "left_wrist", "trajectory+left_wrist"])
+    )
+    published = {row.name for row in results.rows if row.measured_on}
+    here = {row.name for row in results.rows if not row.measured_on}
     assert len(published & here) == 6
 
 
@@ -182,8 +193,8 @@ def test_one_control_is_fine_tuned_and_several_are_blended() -> None:
 
 
 def test_real_motions_stand_beside_and_ratios_are_to_the_uncontrolled_row() -> None:
-    found = control.measure(trial(Fakes()), control_kinds.kinds(["trajectory"]))
-    real, plain, ours = (values(found, row) for row in ("real", "trajectory, uncontrolled", "trajectory, ours"))
+    results = control.measure(trial(Fakes()), control_kinds.kinds(["trajectory"]))
+    real, plain, ours = (values(results, row) for row in ("real", "trajectory, uncontrolled", "trajectory, ours"))
     for name in ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration", "diversity", "fid", "r3"):
         assert ours[name] == pytest.approx(real[name]), name
     assert plain["jerk_ratio"] == plain["slide_ratio"] == 1
@@ -203,9 +214,9 @@ def test_exported_motions_are_held_against_exported_ones() -> None:
     """The two uncontrolled rows differ; each controlled row must be a ratio to its own."""
     numbers, plain = {"jerk": 6.0, "skate_share": 1.0, "skate_speed": 1.0, "skate_slide": 1.0}, {"jerk": 3.0}
     zero = {"skate_share": 0.0, "skate_speed": 0.0, "skate_slide": 1e-13}
-    (found,) = control.against([numbers], [plain | zero])
-    assert found["jerk_ratio"] == 2
-    assert not {"share_ratio", "slide_ratio"} & set(found)  # nothing is so many times nothing
+    (ratios,) = control.against([numbers], [plain | zero])
+    assert ratios["jerk_ratio"] == 2
+    assert not {"share_ratio", "slide_ratio"} & set(ratios)  # nothing is so many times nothing
     assert control.against([numbers], None) == [numbers]
     assert {BASE[name] for name in ("MDM inpainting", "fine-tuned", "DiffusionBlending")} == {UNCONTROLLED}
     assert {BASE[name] for name in (OURS, "ours without exact fit")} == {EXPORTED}
@@ -232,12 +243,12 @@ def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         control.measure(trial(Fakes(stop_after=7)), kinds, parts=parts)
     again = Fakes()
-    found = control.measure(trial(again), kinds, parts=parts)
+    results = control.measure(trial(again), kinds, parts=parts)
     whole = Fakes()
     plain = control.measure(trial(whole), kinds)
     assert len(again.calls) <= len(whole.calls) - 7 + 4  # uncontrolled motions are made again for the second kind
     for row in plain.rows:
-        other = next(r for r in found.rows if (r.name, r.measured_on) == (row.name, row.measured_on))
+        other = next(r for r in results.rows if (r.name, r.measured_on) == (row.name, row.measured_on))
         assert {k: v.mean for k, v in other.values.items() if k != "seconds"} == pytest.approx(
             {k: v.mean for k, v in row.values.items() if k != "seconds"}
         )
@@ -246,21 +257,21 @@ def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
 
 
 def test_a_way_that_these_weights_cannot_go_is_reported_and_stops_nothing() -> None:
-    found = control.measure(trial(Fakes(refuses="fine-tuned")), control_kinds.kinds(["trajectory"]))
-    assert any("fine-tuned: not measured (there is no such adapter)" in note for note in found.notes)
-    assert found.row("trajectory, ours")
+    results = control.measure(trial(Fakes(refuses="fine-tuned")), control_kinds.kinds(["trajectory"]))
+    assert any("fine-tuned: not measured (there is no such adapter)" in note for note in results.notes)
+    assert results.row("trajectory, ours")
 
 
 def test_only_the_asked_ways_and_what_they_are_held_against() -> None:
-    found = control.measure(trial(Fakes()), control_kinds.kinds(["head"]), [OURS])
-    assert [row.name for row in found.rows if not row.measured_on] == ["real", f"head, {EXPORTED}", "head, ours"]
+    results = control.measure(trial(Fakes()), control_kinds.kinds(["head"]), [OURS])
+    assert [row.name for row in results.rows if not row.measured_on] == ["real", f"head, {EXPORTED}", "head, ours"]
 
 
 @pytest.mark.parametrize("fault", ["late", "mirrored", "turned", "centimetres", "short"])
 def test_planted_faults_are_seen(fault: str) -> None:
     """One frame late, left and right exchanged, turned away, another unit, a frame too few."""
 
-    def faulty(target: Target, seed: int) -> Made:
+    def faulty(target: Target, seed: int) -> Track:
         right = perfect(target, seed).positions
         changed = {
             "late": np.concatenate([right[:1], right[:-1]]),
@@ -269,25 +280,25 @@ def test_planted_faults_are_seen(fault: str) -> None:
             "centimetres": 100 * right,
             "short": right[:-1],
         }
-        return Made(changed[fault], target.known)
+        return Track(changed[fault], target.known)
 
-    found = trial(Fakes(controlled=faulty))
+    results = trial(Fakes(controlled=faulty))
     if fault == "short":
         with pytest.raises(ValueError, match="for a goal of"):
-            control.of_method(found, kind("trajectory+left_wrist"), OURS, 0)
+            control.of_method(results, kind("trajectory+left_wrist"), OURS, 0)
         return
-    numbers = control.of_method(found, kind("trajectory+left_wrist"), OURS, 0)
+    numbers = control.of_method(results, kind("trajectory+left_wrist"), OURS, 0)
     assert min(numbers["root_error"], numbers["joint_error"]) > 1
 
 
 def test_an_exported_motion_is_encoded_as_it_is() -> None:
     """Features of an exported walk decode to its own places, up to the canonical start, in as many frames."""
     positions = humanml.decode_positions(ITEMS[1].features)
-    made = of_motion(motion_from_positions(positions, FPS))
-    assert len(made.features) == len(made.positions) == len(positions)
-    decoded = humanml.decode_positions(made.features)
+    track = of_motion(motion_from_positions(positions, FPS))
+    assert len(track.features) == len(track.positions) == len(positions)
+    decoded = humanml.decode_positions(track.features)
     apart = np.linalg.norm(np.diff(decoded[:-1, 0], axis=0), axis=-1) - np.linalg.norm(
-        np.diff(made.positions[:-1, 0], axis=0), axis=-1
+        np.diff(track.positions[:-1, 0], axis=0), axis=-1
     )
     assert np.abs(apart).max() < 2e-3
 
@@ -319,10 +330,10 @@ def test_an_unknown_way_is_refused() -> None:
 
 
 def test_the_report_is_kept_as_data_and_told_as_tables() -> None:
-    found = control.measure(
+    results = control.measure(
         trial(Fakes()), control_kinds.kinds(["in_between"]), run=Run(command="motionloom evaluate control")
     )
-    again = report.decode(json.loads(json.dumps(report.encode(found))))
+    again = report.decode(json.loads(json.dumps(report.encode(results))))
     assert values(again, "in between, ours")["root_error"] == pytest.approx(0, abs=1e-6)
     text = report.markdown(again)
     assert "trajectory failure" in text

@@ -18,5 +18,5 @@ def test_the_tables_of_real_clips_are_the_shipped_numbers(make) -> None:
 
 @pytest.mark.parametrize("one", CHECKS, ids=lambda c: c.name)
 def test_every_prompt_stands_there_with_its_bounds_and_reasons(one) -> None:
-    said = "; ".join(f"`{b.text()}`: {b.why}" for b in one.limits)
-    assert f"| {one.prompt} | {one.seconds:g} | {said} |" in PAGE.read_text(encoding="utf-8")
+    bounds = "; ".join(f"`{b.text()}`: {b.why}" for b in one.limits)
+    assert f"| {one.prompt} | {one.seconds:g} | {bounds} |" in PAGE.read_text(encoding="utf-8")

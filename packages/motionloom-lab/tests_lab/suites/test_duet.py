@@ -54,13 +54,13 @@ def perfect(crops: Crops, sample: int) -> np.ndarray:
 
 def test_a_perfect_completion_has_no_error_and_looks_like_the_real_one() -> None:
     crops = crops_of(couple(6.0))
-    found = duet.score(crops, perfect, 2)
+    scores = duet.score(crops, perfect, 2)
     real = duet.looks(crops.positions[:, :, :FRAMES])
     for name in ERRORS:
-        assert np.array_equal(found[name], np.zeros(3))
-        assert np.array_equal(found[f"mean_{name}"], np.zeros(3))
+        assert np.array_equal(scores[name], np.zeros(3))
+        assert np.array_equal(scores[f"mean_{name}"], np.zeros(3))
     for name in LOOKS:
-        np.testing.assert_allclose(found[name], real[name])
+        np.testing.assert_allclose(scores[name], real[name])
 
 
 def test_standing_still_misses_who_glides_by_the_mean_of_the_way_gone() -> None:
@@ -89,13 +89,13 @@ def test_baselines_see_the_first_second_and_no_frame_more() -> None:
 
 def test_the_mean_of_samples_can_be_right_where_every_sample_is_wrong() -> None:
     def scattered(crops: Crops, sample: int) -> np.ndarray:
-        made = perfect(crops, 0).copy()
-        made[:, :, 20:, :, 0] += 0.3 if sample % 2 else -0.3
-        return made
+        motions = perfect(crops, 0).copy()
+        motions[:, :, 20:, :, 0] += 0.3 if sample % 2 else -0.3
+        return motions
 
-    found = duet.score(crops_of(couple(6.0)), scattered, 2)
-    np.testing.assert_allclose(found["root_2"], 0.3)
-    np.testing.assert_allclose(found["mean_root_2"], 0, atol=1e-12)
+    scores = duet.score(crops_of(couple(6.0)), scattered, 2)
+    np.testing.assert_allclose(scores["root_2"], 0.3)
+    np.testing.assert_allclose(scores["mean_root_2"], 0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("given", "frames", "sees"), [("past", 20, 20), ("tool", 20, 21), ("published", 19, 20)])
@@ -128,11 +128,11 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
     crops, prior = crops_of(positions), tiny.prior()
     oracle, net = Oracle(crops), ways.no_communication_net(tiny.prior())
     way = ways.sampled(prior, net, ways.CompletionSettings(given=given, steps=4), oracle)
-    found = duet.score(crops, way, 1)
-    assert max(float(np.abs(found[name]).max()) for name in ERRORS) < 1e-4
-    asked = oracle.asked[0]
-    assert (asked["frames"], asked["prompts"]) == (FRAMES, [""] * 6)
-    known, mask = asked["edits"].observed.values, asked["edits"].observed.mask
+    scores = duet.score(crops, way, 1)
+    assert max(float(np.abs(scores[name]).max()) for name in ERRORS) < 1e-4
+    call = oracle.asked[0]
+    assert (call["frames"], call["prompts"]) == (FRAMES, [""] * 6)
+    known, mask = call["edits"].observed.values, call["edits"].observed.mask
     assert known.shape == (6, 1 + FRAMES, 263)
     assert mask[:, :, 0].sum(1).tolist() == [slots] * 6
     place = net.places.encode(two.encode(crops.positions[1]).poses)
@@ -147,17 +147,17 @@ def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
     oracle = Oracle(crops)
     way = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=4), oracle)
     way(crops, 0), way(crops.part(slice(2, 4)), 0), way(crops, 1)
-    whole, part, again = (asked["seeds"] for asked in oracle.asked)
+    whole, part, again = (call["seeds"] for call in oracle.asked)
     assert whole[4:] == part
     assert len(set(whole) | set(again)) == 16
 
 
 def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
     crops, prior = crops_of(couple(6.0), 2), tiny.prior()
-    made = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=2))(crops, 0)
-    assert made.shape == (2, 2, FRAMES, 22, 3)
-    np.testing.assert_allclose(made[:, :, :20], crops.positions[:, :, :20], atol=2e-3)
-    assert np.isfinite(made).all()
+    motions = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=2))(crops, 0)
+    assert motions.shape == (2, 2, FRAMES, 22, 3)
+    np.testing.assert_allclose(motions[:, :, :20], crops.positions[:, :, :20], atol=2e-3)
+    assert np.isfinite(motions).all()
 
 
 @pytest.mark.parametrize("config", [tiny.MODULATED, tiny.PUBLISHED], ids=["modulated", "published"])
@@ -206,14 +206,14 @@ def test_the_report_has_every_row_and_the_papers_table() -> None:
     crops = crops_of(gliding(1.0), 6)
 
     def off(crops: Crops, sample: int) -> np.ndarray:
-        made = perfect(crops, 0).copy()
-        made[:, :, 20:, :, 0] += 0.1
-        return made
+        table = perfect(crops, 0).copy()
+        table[:, :, 20:, :, 0] += 0.1
+        return table
 
-    found = {"zero": ways.standing(), "constant": ways.gliding(), "silent": off, "ours": off, "mrt": perfect}
+    methods = {"zero": ways.standing(), "constant": ways.gliding(), "silent": off, "ours": off, "mrt": perfect}
     how = CompletionSettings(crops=6, samples=2)
-    made = duet.measure(crops, found, how)
-    here = [row for row in made.rows if not row.measured_on]
+    table = duet.measure(crops, methods, how)
+    here = [row for row in table.rows if not row.measured_on]
     assert [row.name for row in here] == [
         "real",
         "zero velocity",
@@ -227,13 +227,13 @@ def test_the_report_has_every_row_and_the_papers_table() -> None:
     assert {row.name: row.values["root_3"].mean for row in here if row.name != REAL} == pytest.approx(
         {row.name: {"z": 1.525, "c": 0, "p": 0.1, "o": 0.1, "m": 0}[row.name[0]] for row in here if row.name != REAL}
     )
-    table3 = {row.name: row for row in made.rows if row.measured_on}
+    table3 = {row.name: row for row in table.rows if row.measured_on}
     assert len(table3) == 10
     assert all("3DPW" in row.measured_on and set(row.values) == set(ERRORS) for row in table3.values())
     assert table3["ComMDM (1 layer, after layer 8)"].values["joint_3"].mean == 0.176
-    zero = next(note for note in made.notes if "zero velocity" in note)
+    zero = next(note for note in table.notes if "zero velocity" in note)
     assert "-0.425 ± 0.000 m at 1 s" in zero
-    assert reports.decode(reports.encode(made)).row("zero velocity") is not None
+    assert reports.decode(reports.encode(table)).row("zero velocity") is not None
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
@@ -268,9 +268,9 @@ def test_targets_that_cannot_be_are_reported(tmp_path: Path, monkeypatch: pytest
     with pytest.raises(MotionloomError, match="is not a folder"):
         pairs_of(tmp_path / "none")
     (tmp_path / "x_a.bvh").write_text("")
-    with pytest.raises(MotionloomError, match="has no partner") as told:
+    with pytest.raises(MotionloomError, match="has no partner") as error:
         pairs_of(tmp_path)
-    assert not isinstance(told.value, NoData)
+    assert not isinstance(error.value, NoData)
     with pytest.raises(MotionloomError, match="the rows are"):
         duet.run(Run(data=tmp_path), kinds=("best",))
 
@@ -278,10 +278,10 @@ def test_targets_that_cannot_be_are_reported(tmp_path: Path, monkeypatch: pytest
 def test_a_transformer_from_its_file_is_a_row(tmp_path: Path) -> None:
     config = MrtConfig(width=16, hidden=24, layers=1, heads=2, key=8)
     file = MrtFile(Mrt(config)).save(tmp_path / "mrt.safetensors")
-    found = duet.ways_of(tiny.prior(), None, CompletionSettings(), mrt=file)
-    assert list(found) == ["zero", "constant", "silent", "mrt"]
-    made = found["mrt"](crops_of(couple(6.0), 2), 0)
-    assert made.shape == (2, 2, FRAMES, 22, 3)
+    methods = duet.ways_of(tiny.prior(), None, CompletionSettings(), mrt=file)
+    assert list(methods) == ["zero", "constant", "silent", "mrt"]
+    motions = methods["mrt"](crops_of(couple(6.0), 2), 0)
+    assert motions.shape == (2, 2, FRAMES, 22, 3)
 
 
 def saved(prior, path: Path, name: str, **sizes: Any) -> Path:
@@ -297,15 +297,15 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
         saved(prior, tmp_path / "x.safetensors", "layers2", layers=2, split=1),
         saved(prior, tmp_path / "y.safetensors", "known", aware=True),
     ]
-    found = duet.beside_rows(prior, files, ways.CompletionSettings(steps=2))
-    assert [one.row for one in found] == [
+    rows = duet.beside_rows(prior, files, ways.CompletionSettings(steps=2))
+    assert [one.row for one in rows] == [
         "layers2: 2 layers after layer 1, not aware",
         f"known: 1 layer after layer {last}",
     ]
-    assert found[0].digest == weights_digest(files[0])[:12]  # graphs do not count
+    assert rows[0].digest == weights_digest(files[0])[:12]  # graphs do not count
     silent = ways.sampled(prior, ways.no_communication_net(prior), ways.CompletionSettings(steps=2))
-    made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))
-    np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
+    motions, alone = (way(crops_of(couple(6.0), 2), 0) for way in (rows[0].way, silent))
+    np.testing.assert_allclose(motions, alone, atol=1e-4)  # a fresh block says nothing
 
 
 def test_two_blocks_of_one_name_and_blocks_of_another_prior_are_reported(tmp_path: Path) -> None:
@@ -326,9 +326,9 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
     def counted(name: str, off: float) -> Any:
         def way(crops: Crops, sample: int) -> np.ndarray:
             calls.append(name)
-            made = perfect(crops, 0).copy()
-            made[:, :, 20:, :, 0] += off
-            return made
+            motions = perfect(crops, 0).copy()
+            motions[:, :, 20:, :, 0] += off
+            return motions
 
         return way
 
@@ -338,16 +338,16 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
         for name, digest, off in [("b", "1", 0.1), ("b", "1", 0.1), ("b", "2", 0.3)]
     )
     ours = {"ours": counted("ours", 0.0)}
-    made = duet.measure(crops, ours, how, kinds=kinds, beside=[first], run=Run(folder=tmp_path))
-    here = [row for row in made.rows if not row.measured_on]
+    motions = duet.measure(crops, ours, how, kinds=kinds, beside=[first], run=Run(folder=tmp_path))
+    here = [row for row in motions.rows if not row.measured_on]
     assert [row.name for row in here] == ["ours, one sample", "ours, mean of 2 samples", "b: 1 layer"]
     assert here[2].values["root_2"].mean == pytest.approx(0.1)
     assert any(
-        "less that of b: 1 layer, crop by crop" in note and "-0.100 ± 0.000 m at 1 s" in note for note in made.notes
+        "less that of b: 1 layer, crop by crop" in note and "-0.100 ± 0.000 m at 1 s" in note for note in motions.notes
     )
-    assert made.protocol["blocks beside"] == {"b: 1 layer": "1"}
+    assert motions.protocol["blocks beside"] == {"b: 1 layer": "1"}
     assert calls == ["ours", "ours", "1"]
-    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], run=Run(folder=tmp_path)) == made
+    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], run=Run(folder=tmp_path)) == motions
     assert len(calls) == 3
     other = duet.measure(crops, ours, how, kinds=kinds, beside=[second], run=Run(folder=tmp_path))
     assert calls[3:] == ["2"]

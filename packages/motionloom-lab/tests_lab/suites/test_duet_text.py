@@ -26,10 +26,10 @@ TEXT_HOW = duet_text.DuetSettings(duets=5, seconds=6.0)
 TABLE = duet_text.text_table(RECORDED)
 
 
-def made_at(apart: float, asked: list[tuple[str, int, int]] | None = None) -> duet_text.Make:
+def made_at(apart: float, calls: list[tuple[str, int, int]] | None = None) -> duet_text.Make:
     def make(caption: str, count: int, seed: int) -> list:
-        if asked is not None:
-            asked.append((caption, count, seed))
+        if calls is not None:
+            calls.append((caption, count, seed))
         people = partners(apart, 6.0)
         return [cast(Any, (Person(people[0]), Person(people[1]))) for _ in range(count)]
 
@@ -38,18 +38,18 @@ def made_at(apart: float, asked: list[tuple[str, int, int]] | None = None) -> du
 
 def drawn_apart(caption: str, count: int, seed: int) -> list:
     """Partners who come and go together, every duet in another rhythm."""
-    made = []
+    duets = []
     for number in range(count):
         people = partners(1.0, 6.0, 0.0)
         way = np.sin(np.arange(people.shape[1]) / (4 + 3 * number + seed))[:, None, None] * np.array([0.2, 0.0, 0.0])
-        made.append(cast(Any, (Person(people[0] + way), Person(people[1] + way))))
-    return made
+        duets.append(cast(Any, (Person(people[0] + way), Person(people[1] + way))))
+    return duets
 
 
 def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
-    asked: list[tuple[str, int, int]] = []
-    found = duet_text.measure(RECORDED, made_at(1.0, asked), made_at(4.0), TEXT_HOW, table=TABLE)
-    assert [row.name for row in found.rows] == [
+    calls: list[tuple[str, int, int]] = []
+    results = duet_text.measure(RECORDED, made_at(1.0, calls), made_at(4.0), TEXT_HOW, table=TABLE)
+    assert [row.name for row in results.rows] == [
         "real",
         "real, held-out pairs",
         "real, partners shuffled",
@@ -57,16 +57,16 @@ def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
         "ours, partners shuffled",
         "prior without communication",
     ]
-    assert asked == [("two people dance", 3, 0), ("a couple dances", 2, 1)]
-    ours, far = found.row("ours"), found.row("prior without communication")
+    assert calls == [("two people dance", 3, 0), ("a couple dances", 2, 1)]
+    ours, far = results.row("ours"), results.row("prior without communication")
     assert ours is not None
     assert far is not None
     assert ours.values["distance"].mean == pytest.approx(1.0)
     assert ours.values["distance"].count == 5
     assert ours.values["ratio_distance"].mean < 1.5 < far.values["ratio_distance"].mean
     assert ours.values["looking_away"].mean == pytest.approx(0, abs=1e-4)
-    assert any("ours: within 1.5 times" in note for note in found.notes)
-    assert "ours: mean penetration 0.00 cm, under 3 cm." in found.notes
+    assert any("ours: within 1.5 times" in note for note in results.notes)
+    assert "ours: mean penetration 0.00 cm, under 3 cm." in results.notes
     strangers = duet_text.measure(RECORDED, drawn_apart, None, TEXT_HOW, table=TABLE, kinds=("our-strangers",))
     assert [row.name for row in strangers.rows] == ["ours, partners shuffled"]
     assert strangers.rows[0].values["synchrony"].mean < 0.9 < ours.values["synchrony"].mean
@@ -74,11 +74,11 @@ def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
 
 def test_the_ratio_of_the_distance_in_closed_form() -> None:
     """Real distances 0.9, 1.0, 1.1, 1.05: Wasserstein distances of each from the others, by hand."""
-    found = duet_text.measure(RECORDED, made_at(1.3), None, TEXT_HOW, table=TABLE, kinds=("ours",))
+    results = duet_text.measure(RECORDED, made_at(1.3), None, TEXT_HOW, table=TABLE, kinds=("ours",))
     real = [0.9, 1.0, 1.1, 1.05]
     spread = np.mean([np.mean([abs(one - o) for k, o in enumerate(real) if k != n]) for n, one in enumerate(real)])
     away = np.mean([1.3 - one for one in real])
-    assert found.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
+    assert results.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
 
 
 def test_real_pairs_held_out_are_beside_the_others_and_strangers_are_of_other_recordings(
@@ -93,16 +93,16 @@ def test_real_pairs_held_out_are_beside_the_others_and_strangers_are_of_other_re
 
     monkeypatch.setattr(duet_text.groups, "shuffled", watched)
     kinds = ("held-out", "strangers")
-    found = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=kinds)
+    results = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=kinds)
     away = np.mean([0.15, 0.05, 0.05])
     spread = np.mean([np.mean([0.1, 0.2]), np.mean([0.1, 0.1]), np.mean([0.2, 0.1])])
-    assert found.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
+    assert results.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
     assert shifts == [3]
-    assert [row.name for row in found.rows] == ["real, held-out pairs", "real, partners shuffled"]
+    assert [row.name for row in results.rows] == ["real, held-out pairs", "real, partners shuffled"]
     nobody = [replace(pair, split="train") for pair in RECORDED]
-    found = duet_text.measure(nobody, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=kinds)
-    assert [row.name for row in found.rows] == ["real, partners shuffled"]
-    assert found.protocol["real windows"] == 12
+    results = duet_text.measure(nobody, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=kinds)
+    assert [row.name for row in results.rows] == ["real, partners shuffled"]
+    assert results.protocol["real windows"] == 12
 
 
 def test_the_columns_have_their_units() -> None:
@@ -127,11 +127,11 @@ def test_duets_are_made_for_captions_of_train_pairs_each_with_seeds_of_its_own(m
     assert duet_text.turns(("a", "b"), duet_text.DuetSettings(duets=5, seed=2)) == [("a", 3, 4), ("b", 2, 5)]
     times = iter([3.0, 13.0])
     monkeypatch.setattr(duet_text.time, "perf_counter", lambda: next(times))
-    found = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=("ours",))
-    assert [row.name for row in found.rows] == ["ours"]
-    assert found.rows[0].values["seconds"].mean == 2.0
-    assert found.rows[0].values["within"].mean == np.mean(
-        [found.rows[0].values[f"ratio_{name}"].mean <= 1.5 for name in duet_text.groups.JUDGED]
+    results = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=("ours",))
+    assert [row.name for row in results.rows] == ["ours"]
+    assert results.rows[0].values["seconds"].mean == 2.0
+    assert results.rows[0].values["within"].mean == np.mean(
+        [results.rows[0].values[f"ratio_{name}"].mean <= 1.5 for name in duet_text.groups.JUDGED]
     )
 
 
@@ -166,22 +166,22 @@ def test_the_prior_without_communication_begins_where_real_partners_stand() -> N
 # Answers -------------------------------------------------------------------------------------------------------------
 
 
-def answered(given: duet_answers.Windows, off: float = 0.0) -> duet_text.Make:
+def answered(pool: duet_answers.Windows, off: float = 0.0) -> duet_text.Make:
     """Whoever is given is answered by the real partner, ``off`` metres aside."""
     aside = np.array([off, 0.0, 0.0])
     return lambda caption, count, seed: [
-        cast(Any, (Person(window[0]), Person(window[1] + aside))) for window in given.draw(caption, count, seed)
+        cast(Any, (Person(window[0]), Person(window[1] + aside))) for window in pool.draw(caption, count, seed)
     ]
 
 
 def test_people_of_held_out_pairs_are_given_in_either_order() -> None:
     other = pair_of(couple(12.0), "other", "test", ["two people walk"])
     short = pair_of(couple(4.0), "short", "test", ["two people run"])
-    given = duet_answers.Windows.of([*RECORDED, other, short], TEXT_HOW)
-    assert given.captions() == ("two people dance", "a couple dances", "two people walk")
-    some = given.draw("two people walk", 20, 3)
-    assert np.array_equal(some, given.draw("two people walk", 20, 3))
-    assert not np.array_equal(some, given.draw("two people walk", 20, 4))
+    pool = duet_answers.Windows.of([*RECORDED, other, short], TEXT_HOW)
+    assert pool.captions() == ("two people dance", "a couple dances", "two people walk")
+    some = pool.draw("two people walk", 20, 3)
+    assert np.array_equal(some, pool.draw("two people walk", 20, 3))
+    assert not np.array_equal(some, pool.draw("two people walk", 20, 4))
     assert len({float(one[0, 0, 0, 2]) for one in some}) > 10
     assert 3 < sum(one[0, 0, 0, 0] < one[1, 0, 0, 0] for one in some) < 17
     assert {one.shape for one in some} == {(2, 120, 22, 3)}
@@ -190,12 +190,12 @@ def test_people_of_held_out_pairs_are_given_in_either_order() -> None:
 
 
 def test_the_real_partner_is_the_best_answer_and_distances_are_from_them() -> None:
-    given = duet_answers.Windows.of(RECORDED, TEXT_HOW)
-    found = duet_text.measure(
-        RECORDED, answered(given), answered(given, 0.3), TEXT_HOW, table=duet_answers.table(given, TEXT_HOW)
+    pool = duet_answers.Windows.of(RECORDED, TEXT_HOW)
+    results = duet_text.measure(
+        RECORDED, answered(pool), answered(pool, 0.3), TEXT_HOW, table=duet_answers.table(pool, TEXT_HOW)
     )
-    assert found.suite == "duet-answers"
-    assert [row.name for row in found.rows] == [
+    assert results.suite == "duet-answers"
+    assert [row.name for row in results.rows] == [
         "real",
         "real, held-out pairs",
         "real, partners shuffled",
@@ -203,13 +203,13 @@ def test_the_real_partner_is_the_best_answer_and_distances_are_from_them() -> No
         "ours, partners shuffled",
         "prior without communication",
     ]
-    ours, aside = found.row("ours"), found.row("prior without communication")
+    ours, aside = results.row("ours"), results.row("prior without communication")
     assert ours is not None
     assert aside is not None
     assert [ours.values[f"root_{k}"].mean for k in mp.HORIZONS] == [0, 0, 0]
     assert [aside.values[f"root_{k}"].mean for k in mp.HORIZONS] == pytest.approx([0.3] * 3)
     assert ours.values["distance"].mean == pytest.approx(1.05)
-    assert reports.decode(reports.encode(found)).columns == found.columns
+    assert reports.decode(reports.encode(results)).columns == results.columns
 
 
 def test_the_distance_is_that_at_the_end_of_each_second() -> None:
@@ -217,15 +217,15 @@ def test_the_distance_is_that_at_the_end_of_each_second() -> None:
     real = couple(6.0, speed=0.0)[:, :60]
     away = real.copy()
     away[1] += np.arange(60)[:, None, None] / FPS * np.array([0.6, 1.0, 0.8])
-    found = duet_answers.apart([away], [real])
-    assert [found[f"root_{k}"].mean for k in (1, 2, 3)] == pytest.approx([0.95, 1.95, 2.95])
+    distances = duet_answers.apart([away], [real])
+    assert [distances[f"root_{k}"].mean for k in (1, 2, 3)] == pytest.approx([0.95, 1.95, 2.95])
 
 
 def test_somebody_given_stays_whoever_answers() -> None:
     prior, how = tiny.prior(), duet_text.DuetSettings(duets=2, seconds=2.0, steps=2, clean=False)
-    given = duet_answers.Windows.of(RECORDED, how)
-    real = given.draw("two people dance", 2, 5)
-    for make in (duet_answers.answers(prior, block_over(prior), given, how), duet_answers.alone(prior, given, how)):
+    pool = duet_answers.Windows.of(RECORDED, how)
+    real = pool.draw("two people dance", 2, 5)
+    for make in (duet_answers.answers(prior, block_over(prior), pool, how), duet_answers.alone(prior, pool, how)):
         made = make("two people dance", 2, 5)
         for (first, second), window in zip(made, real, strict=True):
             assert (len(first), len(second)) == (40, 40)
@@ -238,9 +238,9 @@ def test_the_silent_partner_begins_where_the_real_one_does(monkeypatch: pytest.M
     still = motion_from_positions(standing(2.0), FPS)
     monkeypatch.setattr(duet_answers, "generate", lambda *a, **k: [still])
     how = duet_text.DuetSettings(duets=2, seconds=2.0)
-    given = duet_answers.Windows.of(RECORDED, how)
-    made = duet_answers.alone(tiny.prior(), given, how)("two people dance", 6, 5)
-    for (_, second), window in zip(made, given.draw("two people dance", 6, 5), strict=True):
+    pool = duet_answers.Windows.of(RECORDED, how)
+    made = duet_answers.alone(tiny.prior(), pool, how)("two people dance", 6, 5)
+    for (_, second), window in zip(made, pool.draw("two people dance", 6, 5), strict=True):
         assert np.abs(second.positions()[0] - window[1, 0]).max() < 0.05
 
 
@@ -257,29 +257,29 @@ def drifting(rate: float) -> duet_text.Make:
 def test_partners_who_drift_apart_are_seen_in_the_last_seconds() -> None:
     how = duet_long.LongDuetSettings(duets=3)
     table = duet_long.table(TABLE.captions, how)
-    found = duet_text.measure(RECORDED, drifting(0.1), drifting(0.0), how, table=table)
-    assert [row.name for row in found.rows[3:]] == [
+    results = duet_text.measure(RECORDED, drifting(0.1), drifting(0.0), how, table=table)
+    assert [row.name for row in results.rows[3:]] == [
         "ours, last 6 s",
         "ours, last 6 s, partners shuffled",
         "ours, first 6 s",
         "prior without communication, last 6 s",
     ]
-    apart = {row.name: row.values["distance"].mean for row in found.rows}
+    apart = {row.name: row.values["distance"].mean for row in results.rows}
     middle = 119 / 2 / FPS  # of six seconds
     assert apart["ours, first 6 s"] == pytest.approx(1.0 + 0.1 * middle)
     assert apart["ours, last 6 s"] == pytest.approx(1.0 + 0.1 * (12 + middle))
     assert apart["ours, last 6 s, partners shuffled"] == pytest.approx(apart["ours, last 6 s"], abs=1e-3)
     assert apart["prior without communication, last 6 s"] == pytest.approx(1.0)
-    assert any(note.startswith("ours, last 6 s: not within") for note in found.notes)
-    assert found.suite == "duet-long"
+    assert any(note.startswith("ours, last 6 s: not within") for note in results.notes)
+    assert results.suite == "duet-long"
 
 
 def test_captions_follow_one_another_and_pieces_are_one_duet() -> None:
     prior, how = tiny.prior(), duet_long.LongDuetSettings(duets=2, seconds=2.0, segments=2, steps=2, clean=False)
-    said = [
+    captions = [
         segment.text for segment in duet_long.timeline(("a", "b", "c"), "b", duet_long.LongDuetSettings(segments=4))
     ]
-    assert said == ["b", "c", "a", "b"]
+    assert captions == ["b", "c", "a", "b"]
     makes = (
         duet_long.ours(prior, block_over(prior), TABLE.captions, how),
         duet_long.alone(prior, RECORDED, TABLE.captions, how),
@@ -299,22 +299,22 @@ def test_captions_follow_one_another_and_pieces_are_one_duet() -> None:
 def test_every_part_is_made_by_its_own_module_and_told_with_its_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: dict[str, Any] = {}
+    calls: dict[str, Any] = {}
     modules = {duet_text.parts: "text", duet_answers.parts: "answers", duet_long.parts: "long"}
 
     def run(run: Run, parts_of: Any, **how: Any) -> reports.Report:
-        asked[modules[parts_of]] = {**how, "command": run.command}
+        calls[modules[parts_of]] = {**how, "command": run.command}
         return reports.Report("duet-x", modules[parts_of], run.command, {}, duet_text.COLUMNS, ())
 
     monkeypatch.setattr(duet_text, "run", run)
     words = ["evaluate", "duet", "--data", str(tmp_path), "--quick", "--duets", "3", "--out", str(tmp_path / "out")]
     for part in ("text", "answers", "long"):
         assert main([*words, "--only", part]) == 0
-        how = asked[part]["how"]
+        how = calls[part]["how"]
         assert (how.duets, how.steps) == (3, 6)
-        assert asked[part]["command"] == (
+        assert calls[part]["command"] == (
             f"motionloom evaluate duet --weights default --data PACK --only {part} --duets 3 --quick"
         )
         assert (tmp_path / "out" / part / "report.json").is_file()
-    assert asked["long"]["how"].segments == 2
+    assert calls["long"]["how"].segments == 2
     capsys.readouterr()

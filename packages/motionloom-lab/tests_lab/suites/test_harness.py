@@ -27,14 +27,14 @@ def walk(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[np.
 
 
 def test_obedience_and_realism_take_a_function_that_makes_motions(tmp_path: Path) -> None:
-    said: list[str] = []
-    run = Run(folder=tmp_path, progress=said.append)
-    [found] = obey.run(run, [check("walk forward")], generate=walk, seeds=2)
-    assert [attempt.obeyed for attempt in found.attempts] == [True, True]
+    lines: list[str] = []
+    run = Run(folder=tmp_path, progress=lines.append)
+    [result] = obey.run(run, [check("walk forward")], generate=walk, seeds=2)
+    assert [attempt.obeyed for attempt in result.attempts] == [True, True]
     assert (tmp_path / "obedience.json").is_file()
-    made, fps = realism.run(run, [realism.Order(("a person walks",) * 3, 2.0)], generate=walk)
-    assert (len(made), fps) == (3, FPS)
-    assert len(said) == 2
+    clips, fps = realism.run(run, [realism.Order(("a person walks",) * 3, 2.0)], generate=walk)
+    assert (len(clips), fps) == (3, FPS)
+    assert len(lines) == 2
 
 
 @pytest.mark.parametrize(

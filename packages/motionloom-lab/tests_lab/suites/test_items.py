@@ -49,12 +49,12 @@ def official(tmp_path: Path) -> Path:
 
 def test_a_humanml3d_folder_gives_tokens_spans_and_published_lengths(official: Path) -> None:
     """40 frames or more, at most 200, cropped to multiples of 4; parts at floor(20 s) as published."""
-    found = {i.name: i for i in items.read_items(official, items.fitting(official, None))}
-    assert list(found) == ["000001@0-5.15", "000001@1-3.55", "M000001@0-5.15", "M000001@1-3.55", "edge@0-9.95"]
-    whole, part = found["000001@0-5.15"], found["000001@1-3.55"]
+    by_name = {i.name: i for i in items.read_items(official, items.fitting(official, None))}
+    assert list(by_name) == ["000001@0-5.15", "000001@1-3.55", "M000001@0-5.15", "M000001@1-3.55", "edge@0-9.95"]
+    whole, part = by_name["000001@0-5.15"], by_name["000001@1-3.55"]
     assert [c.text for c in whole.captions] == ["a man walks.", "he steps forward"]
     assert whole.captions[0].tokens == ("a/DET", "man/NOUN", "walk/VERB")
-    assert (len(whole.features), len(part.features), len(found["edge@0-9.95"].features)) == (100, 48, 196)
+    assert (len(whole.features), len(part.features), len(by_name["edge@0-9.95"].features)) == (100, 48, 196)
     assert (part.features[0, 0], part.features[-1, 0]) == (20, 67)
 
 
@@ -85,10 +85,10 @@ def test_a_damaged_humanml3d_folder_is_one_clear_sentence(official: Path, damage
 @settings(max_examples=100, deadline=None)
 def test_any_text_beside_a_motion_is_read_or_refused(caption: str, lines: list[str]) -> None:
     try:
-        found = list(items._spoken("n", "test", counting(120), f"{caption}#a/DET#0.0#0.0\n" + "\n".join(lines)))
+        chosen = list(items._spoken("n", "test", counting(120), f"{caption}#a/DET#0.0#0.0\n" + "\n".join(lines)))
     except MotionloomError:
         return
-    assert all(0 < len(one.features) <= 120 and one.captions for one in found)
+    assert all(0 < len(one.features) <= 120 and one.captions for one in chosen)
 
 
 @pytest.fixture
@@ -113,12 +113,12 @@ def built(tmp_path: Path) -> Path:
 
 
 def test_a_built_set_gives_what_people_wrote_about_held_out_recordings_of_the_chosen_sources(built: Path) -> None:
-    found = items.read_items(built, Selection())
-    assert [(i.name, i.split, len(i.features)) for i in found] == [
+    chosen = items.read_items(built, Selection())
+    assert [(i.name, i.split, len(i.features)) for i in chosen] == [
         ("Ma@0-4.5", "test", 88),
         ("a@0-4.5", "test", 88),
     ]
-    assert [c.text for c in found[0].captions] == ["walks ahead"]
+    assert [c.text for c in chosen[0].captions] == ["walks ahead"]
     assert len(items.read_items(built, Selection(sources=()))) == 3
     assert [i.name for i in items.read_items(built, Selection(splits=("train",)))] == ["b@0-4.5"]
 
@@ -147,19 +147,19 @@ def test_a_third_of_the_lengths_is_one_unit_shorter() -> None:
 
 @given(st.integers(1, 50), st.integers(1, 50))
 def test_chosen_places_are_spread_from_first_to_last(count: int, of: int) -> None:
-    found = items.spread(count, of)
-    assert len(set(found)) == len(found) == min(count, of)
-    assert found[0] == 0
-    if len(found) > 1:
-        assert found[-1] == of - 1
-        assert max(np.diff(found)) - min(np.diff(found)) <= 1
+    places = items.spread(count, of)
+    assert len(set(places)) == len(places) == min(count, of)
+    assert places[0] == 0
+    if len(places) > 1:
+        assert places[-1] == of - 1
+        assert max(np.diff(places)) - min(np.diff(places)) <= 1
 
 
 def test_captions_are_drawn_evenly_and_by_seed() -> None:
-    said = [tuple(Caption(str(k)) for k in range(4))] * 4000
-    drawn = items.pick(said, np.random.default_rng(3))
-    assert drawn == items.pick(said, np.random.default_rng(3))
-    assert np.bincount(drawn) == pytest.approx([1000] * 4, abs=120)
+    captions = [tuple(Caption(str(k)) for k in range(4))] * 4000
+    picks = items.pick(captions, np.random.default_rng(3))
+    assert picks == items.pick(captions, np.random.default_rng(3))
+    assert np.bincount(picks) == pytest.approx([1000] * 4, abs=120)
 
 
 # ---- the reference ---------------------------------------------------------------------------------------------------
@@ -253,20 +253,26 @@ def test_any_bytes_in_place_of_a_reference_are_read_or_refused(
     data[min(flip, len(data) - 1)] ^= 0x15
     (folder / "r.safetensors").write_bytes(data)
     try:
-        found = text_reference.load(folder / "r.safetensors", Judge())
+        reference = text_reference.load(folder / "r.safetensors", Judge())
     except MotionloomError:
         return
-    assert len(found.names) == len(found.captions) == len(found.frames) == len(found.motions) == len(found.physical)
-    assert np.isfinite(found.motions).all()
-    assert np.isfinite(found.physical).all()
+    assert (
+        len(reference.names)
+        == len(reference.captions)
+        == len(reference.frames)
+        == len(reference.motions)
+        == len(reference.physical)
+    )
+    assert np.isfinite(reference.motions).all()
+    assert np.isfinite(reference.physical).all()
 
 
 def test_physical_numbers_of_a_slide_are_its_speed() -> None:
     """Standing and pushed at 1 m/s: 100 % of frames skate, at 100 cm/s and 50 mm a frame; bones stay, nothing sinks."""
     push = np.outer(np.arange(80) / 20, [0.0, 0.0, 1.0])
-    found = text_reference.of_features(humanml.encode(moved(standing(4.0), push), heading="corrected"))
-    wanted = {"skate_share": 100, "skate_speed": 100, "skate_slide": 50, "penetration": 0, "bone_error": 0, "jerk": 0}
-    assert found == pytest.approx(wanted, abs=0.1)
+    numbers = text_reference.of_features(humanml.encode(moved(standing(4.0), push), heading="corrected"))
+    limits = {"skate_share": 100, "skate_speed": 100, "skate_slide": 50, "penetration": 0, "bone_error": 0, "jerk": 0}
+    assert numbers == pytest.approx(limits, abs=0.1)
     sunk = text_reference.of_features(humanml.encode(standing(4.0) - [0, 0.03, 0], heading="corrected"))
     assert sunk["penetration"] == pytest.approx(3, abs=0.01)
 

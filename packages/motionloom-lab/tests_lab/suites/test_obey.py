@@ -47,10 +47,10 @@ def test_a_prompt_counts_when_nine_of_ten_seeds_obey() -> None:
 
 def test_paraphrases_are_tried_and_counted_apart() -> None:
     results = obey.run(Run(), [FORWARD], generate=Walker(), seeds=2, paraphrases=True)
-    found = obey.totals(results, [FORWARD])
+    totals = obey.totals(results, [FORWARD])
     assert len(results[0].attempts) == 2 * (1 + len(FORWARD.paraphrases))
-    assert found["seeds_obeyed_share"] == found["paraphrases_obeyed_share"] == 0.5
-    assert (found["paraphrases"], found["paraphrases_obeyed"]) == (len(FORWARD.paraphrases), 0)
+    assert totals["seeds_obeyed_share"] == totals["paraphrases_obeyed_share"] == 0.5
+    assert (totals["paraphrases"], totals["paraphrases_obeyed"]) == (len(FORWARD.paraphrases), 0)
 
 
 def test_a_stopped_run_goes_on_without_doing_anything_twice(tmp_path: Path) -> None:
@@ -103,13 +103,13 @@ def test_any_json_in_place_of_results_is_read_or_refused(
     path = tmp_path_factory.mktemp("found") / "obedience.json"
     path.write_text(json.dumps({"settings": {"a": 1}, "checks": checks}))
     try:
-        found = obey._read(path, {"a": 1})
+        results = obey._read(path, {"a": 1})
     except MotionloomError as error:
-        told, found = str(error), {}
+        message, results = str(error), {}
     else:
-        told = str(path)
-    assert str(path) in told
-    assert all(isinstance(a, obey.Attempt) for attempts in found.values() for a in attempts)
+        message = str(path)
+    assert str(path) in message
+    assert all(isinstance(a, obey.Attempt) for attempts in results.values() for a in attempts)
 
 
 def test_a_changed_bound_changes_the_fingerprint() -> None:

@@ -29,17 +29,17 @@ def trial() -> trials.PredictionTrial:
     return trials.prepare(protocol())
 
 
-def told(trial: trials.PredictionTrial):
+def clairvoyant(trial: trials.PredictionTrial):
     """A way that knows what comes, by the first frame of the past."""
     known = {trial.pasts(k, k + 1)[0].tobytes(): trial.future(k) for k in range(len(trial.windows))}
     return lambda past: np.stack([known[one.tobytes()][None].repeat(2, 0) for one in past])
 
 
 def test_who_knows_the_future_is_right_and_draws_it_every_time(trial: trials.PredictionTrial) -> None:
-    found = trials.score(trial, told(trial), samples=2)
-    assert max(found[name] for name in ("apd", "ade", "fde", "root_ade", "root_fde", "mae", "stretch")) < 1e-5
+    scores = trials.score(trial, clairvoyant(trial), samples=2)
+    assert max(scores[name] for name in ("apd", "ade", "fde", "root_ade", "root_fde", "mae", "stretch")) < 1e-5
     real = trials.score(trial, None)
-    assert {n: found[n] for n in ("jerk", "cmd", "seam_velocity", "jitter")} == pytest.approx(
+    assert {n: scores[n] for n in ("jerk", "cmd", "seam_velocity", "jitter")} == pytest.approx(
         {n: real[n] for n in ("jerk", "cmd", "seam_velocity", "jitter")}
     )
     assert not {"ade", "fde", "root_ade", "seconds"} & real.keys()
@@ -97,9 +97,9 @@ def test_windows_of_a_single_future_are_skipped_when_asked() -> None:
     with pytest.raises(MotionloomError, match="more than one future"):
         trials.prepare(alone, singles="skip")
     way = prediction.by_rule(metrics.zero_velocity, AHEAD)
-    found = trials.score(trials.prepare(alone, singles="skip_multimodal"), way)
-    assert "ade" in found
-    assert "mmade" not in found
+    scores = trials.score(trials.prepare(alone, singles="skip_multimodal"), way)
+    assert "ade" in scores
+    assert "mmade" not in scores
     counted = trials.score(trials.prepare(alone), way)
     assert counted["mmade"] == pytest.approx(counted["ade"])
 
@@ -109,8 +109,8 @@ def test_the_table_has_every_row_and_everything_that_must_be_said(
 ) -> None:
     lines: list[str] = []
     how = replace(FEW, replications=2)
-    made = prediction.measure(predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lines.append))
-    here = [row for row in made.rows if not row.measured_on]
+    table = prediction.measure(predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lines.append))
+    here = [row for row in table.rows if not row.measured_on]
     assert [row.name for row in here] == [
         REAL,
         prediction.ZERO,
@@ -137,19 +137,19 @@ def test_the_table_has_every_row_and_everything_that_must_be_said(
         "seed",
         "replications",
     ):
-        assert key in made.protocol
-    assert report.decode(json.loads(json.dumps(report.encode(made))))
+        assert key in table.protocol
+    assert report.decode(json.loads(json.dumps(report.encode(table))))
     again = prediction.measure(
         predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lambda line: pytest.fail(line))
     )
-    assert again == made
+    assert again == table
     with pytest.raises(MotionloomError, match="other settings"):
         prediction.measure(predictor(), trial, FEW, run=Run("predictor", folder=tmp_path))
 
 
 def test_ours_keeps_bones_and_the_published_sampler_does_not(trial: trials.PredictionTrial) -> None:
-    made = prediction.measure(predictor(), trial, FEW, ("ours", "published"), with_published=False)
-    ours, published = (row.values["jitter"].mean for row in made.rows)
+    table = prediction.measure(predictor(), trial, FEW, ("ours", "published"), with_published=False)
+    ours, published = (row.values["jitter"].mean for row in table.rows)
     assert ours < published
 
 
@@ -178,8 +178,8 @@ def test_published_rows_are_marked_as_of_other_data_unless_all_of_it_is_here(tri
 
 
 def test_on_a_terminal_every_block_is_a_table_of_its_own(trial: trials.PredictionTrial) -> None:
-    said = report.by_place(prediction.measure(predictor(), trial, FEW, ("real", "zero")))
-    first, *others = said.split("Published, measured on ")
+    page = report.by_place(prediction.measure(predictor(), trial, FEW, ("real", "zero")))
+    first, *others = page.split("Published, measured on ")
     assert "zero velocity" in first
     assert "HumanMAC" not in first
     assert len(others) == 8
@@ -257,14 +257,14 @@ def test_the_command_measures_and_writes(files: tuple[Path, Path], tmp_path: Pat
         "--rows-without-published",
     ]
     assert main(words) == 0
-    said = capsys.readouterr().out
-    assert "tiny, published sampler, 3 steps" in said
-    assert "HumanMAC" not in said
-    found = report.read(tmp_path / "out")
-    assert (found.protocol["data"], found.protocol["samples"], found.protocol["windows measured"]) == ("humaneva", 6, 3)
-    assert found.protocol["windows with one future"] == "skip multimodal"
-    assert "--windows 3" in found.command
-    assert "--singles skip-multimodal" in found.command
+    output = capsys.readouterr().out
+    assert "tiny, published sampler, 3 steps" in output
+    assert "HumanMAC" not in output
+    copy = report.read(tmp_path / "out")
+    assert (copy.protocol["data"], copy.protocol["samples"], copy.protocol["windows measured"]) == ("humaneva", 6, 3)
+    assert copy.protocol["windows with one future"] == "skip multimodal"
+    assert "--windows 3" in copy.command
+    assert "--singles skip-multimodal" in copy.command
     assert (tmp_path / "out" / "report.md").is_file()
     assert (tmp_path / "out" / "report.png").is_file()
 
@@ -304,10 +304,10 @@ def test_a_built_sets_held_out_clips_are_a_test_part_too(tmp_path: Path) -> None
     (tmp_path / "clips").mkdir()
     for name, way in (("02_01", "plain"), ("02_01_looped", "looped"), ("01_01", "plain")):
         write_clip(tmp_path / "clips", Clip(name, "cmu", "free", "train", way, (), features))
-    found = trials.read_test(tmp_path)
-    assert [(r.name, r.split) for r in found.recordings] == [("02_01", "test")]
-    (recording,) = found.recordings
+    data = trials.read_test(tmp_path)
+    assert [(r.name, r.split) for r in data.recordings] == [("02_01", "test")]
+    (recording,) = data.recordings
     assert len(recording.positions) == pytest.approx(len(features) * 1.5, abs=2)
-    speed = np.linalg.norm(np.diff(recording.positions[:, 0], axis=0), axis=1).mean() * found.fps
+    speed = np.linalg.norm(np.diff(recording.positions[:, 0], axis=0), axis=1).mean() * data.fps
     assert speed == pytest.approx(1.0, rel=0.1)
-    assert found.fps == FPS
+    assert data.fps == FPS

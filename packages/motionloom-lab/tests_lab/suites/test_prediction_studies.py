@@ -60,13 +60,13 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     ids=lambda v: v if isinstance(v, str) else "",
 )
 def test_what_is_changed_is_a_row_each(name: str, rows: list[str], small: None, keep: Path) -> None:
-    found = studies.study(name, lab(keep))
-    assert [row.name for row in found.rows] == rows
-    sizes = [row.values["parameters"].mean for row in found.rows[1:]]
+    table = studies.study(name, lab(keep))
+    assert [row.name for row in table.rows] == rows
+    sizes = [row.values["parameters"].mean for row in table.rows[1:]]
     if name in ("coefficients", "layers"):
         assert sizes == sorted(set(sizes))
-    assert all(np.isfinite(row.values["jerk"].mean) for row in found.rows)
-    assert found.protocol["training"].startswith("4 steps")
+    assert all(np.isfinite(row.values["jerk"].mean) for row in table.rows)
+    assert table.protocol["training"].startswith("4 steps")
 
 
 def test_networks_differ_in_what_is_said_and_finished_ones_are_found_again(small: None, keep: Path) -> None:
@@ -97,13 +97,13 @@ def test_a_stopped_network_goes_on(small: None, tmp_path: Path) -> None:
 
 
 def test_steps_are_compared_with_the_most_steps_of_their_kind(keep: Path, tmp_path: Path) -> None:
-    found = studies.study("steps", lab(keep), predictor())
-    assert len(found.rows) == 1 + 2 * 3 * len(SMALL.walks)
-    by_name = {row.name: row.values for row in found.rows}
+    table = studies.study("steps", lab(keep), predictor())
+    assert len(table.rows) == 1 + 2 * 3 * len(SMALL.walks)
+    by_name = {row.name: row.values for row in table.rows}
     few, many = (by_name[f"dpm2m, index, {n} steps"] for n in (2, 4))
     assert many["ade_ratio"].mean == 1
     assert few["ade_ratio"].mean == pytest.approx(few["ade"].mean / many["ade"].mean)
-    studies.write(found, "steps", tmp_path)
+    studies.write(table, "steps", tmp_path)
     assert (tmp_path / "steps.png").stat().st_size > 10_000
     assert "| dpm2m, index, 2 steps |" in (tmp_path / "steps.md").read_text()
     assert report.read(tmp_path / "steps.json").suite == "study-steps"
@@ -121,9 +121,9 @@ def test_a_long_future_begins_as_a_short_one_and_goes_on_from_its_end() -> None:
 
 
 def test_a_horizon_is_measured_second_by_second_beside_real_motion(keep: Path) -> None:
-    found = studies.study("horizon", replace(lab(keep), budget=replace(SMALL, seconds=2.0)), predictor())
-    assert [row.name for row in found.rows] == [REAL, "second 1", "second 2"]
-    real = found.rows[0].values
+    table = studies.study("horizon", replace(lab(keep), budget=replace(SMALL, seconds=2.0)), predictor())
+    assert [row.name for row in table.rows] == [REAL, "second 1", "second 2"]
+    real = table.rows[0].values
     trial = trials.prepare(protocol(), count=2)
     moved = np.stack([trial.future(k) for k in range(2)])
     body = moved[:, :, 1:] - moved[:, :, :1]
@@ -151,13 +151,13 @@ def test_how_lively_motion_is_in_closed_form() -> None:
     """A joint that goes t³ metres from the root has the jerk 6 m/s³; that of the root does not count."""
     places, known = gliding(), behaviour._known_poses(protocol())
     end = (29 / 30) ** 3
-    found = behaviour._lively(places[None], protocol(), known)
-    assert (found["speed"], found["jerk"]) == pytest.approx((0, 0), abs=1e-6)
-    assert (found["root_speed"], found["height"]) == pytest.approx((end / (29 / 30), places[0, 0, 1]))
-    assert found["height"] == pytest.approx(0.9)
+    numbers = behaviour._lively(places[None], protocol(), known)
+    assert (numbers["speed"], numbers["jerk"]) == pytest.approx((0, 0), abs=1e-6)
+    assert (numbers["root_speed"], numbers["height"]) == pytest.approx((end / (29 / 30), places[0, 0, 1]))
+    assert numbers["height"] == pytest.approx(0.9)
     places[:, 20, 1] += (np.arange(30) / 30) ** 3
-    found = behaviour._lively(places[None], protocol(), known)
-    assert (found["speed"], found["jerk"]) == pytest.approx((end / (29 / 30) / 21, 6 / 21), rel=1e-6)
+    numbers = behaviour._lively(places[None], protocol(), known)
+    assert (numbers["speed"], numbers["jerk"]) == pytest.approx((end / (29 / 30) / 21, 6 / 21), rel=1e-6)
 
 
 def test_the_spread_of_futures_is_metres_per_joint_between_two() -> None:
@@ -190,24 +190,24 @@ def test_every_second_of_a_long_future_is_measured_alone(tmp_path: Path, monkeyp
 def test_what_comes_of_holding_a_group_is_told_of_the_other_joints(monkeypatch: pytest.MonkeyPatch) -> None:
     """Free joints are 10 cm off, with the group given 2 cm; second futures 1 or 4 mm more; what is held 1 mm off."""
     trial, held = trials.prepare(protocol(), count=2), [13, 16, 18, 20]
-    told: list[np.ndarray] = []
+    calls: list[np.ndarray] = []
 
     def futures(predictor, past, *, seeds, known=None, exact):
         number = next(k for k in range(2) if np.array_equal(trial.pasts(k, k + 1)[0], past[0]))
-        made, free = trial.future(number)[None].repeat(2, 0), [j for j in range(1, 22) if j not in held]
-        made[:, :, free, 1] += 0.1 if known is None else 0.02
-        made[1, :, free, 1] += 0.001 if known is None else 0.004
+        places, free = trial.future(number)[None].repeat(2, 0), [j for j in range(1, 22) if j not in held]
+        places[:, :, free, 1] += 0.1 if known is None else 0.02
+        places[1, :, free, 1] += 0.001 if known is None else 0.004
         if known is not None:
-            told.append(known.mask)
-            made[number, 3, held[1], 2] += 0.001 * number
-        return made
+            calls.append(known.mask)
+            places[number, 3, held[1], 2] += 0.001 * number
+        return places
 
     turns = iter([0.25, 0.125])
     monkeypatch.setattr(behaviour, "next_frames", futures)
     monkeypatch.setattr(behaviour, "held_rotations", lambda *args, **given: next(turns))
-    found = behaviour.held_numbers(predictor(), trial, "left_arm", samples=2, seed=0)
+    numbers = behaviour.held_numbers(predictor(), trial, "left_arm", samples=2, seed=0)
     assert sorted(behaviour.SMPL22.groups["left_arm"]) == held
-    assert all(np.array_equal(np.flatnonzero(mask.all(axis=0)), held) and mask.sum() == 4 * AHEAD for mask in told)
+    assert all(np.array_equal(np.flatnonzero(mask.all(axis=0)), held) and mask.sum() == 4 * AHEAD for mask in calls)
     wide = 17**0.5  # of 17 joints, each as far off
     expected = {
         "free": 0.1 * wide,
@@ -217,14 +217,14 @@ def test_what_comes_of_holding_a_group_is_told_of_the_other_joints(monkeypatch: 
         "held": 0.001,
         "rotations": 0.25,
     }
-    assert found == pytest.approx(expected, rel=1e-6)
+    assert numbers == pytest.approx(expected, rel=1e-6)
 
 
 def test_jumps_and_speed_of_a_way_in_between_in_closed_form() -> None:
     """A hand at 1 m/s, from frame 10 on at 2, from frame 20 on at 5: jumps of 1 and 3 m/s, of one joint of 21."""
     places = np.repeat(gliding(1), 40, axis=0)
     places[:, 20, 1] += np.cumsum(np.repeat([1.0, 2.0, 5.0], [10, 10, 20])) / 30
-    found = behaviour._ends(places, 10, 20, 30.0)
+    numbers = behaviour._ends(places, 10, 20, 30.0)
     expected = {
         "start_velocity": 1 / 21,
         "start_acceleration": 30 / 21,
@@ -232,17 +232,17 @@ def test_jumps_and_speed_of_a_way_in_between_in_closed_form() -> None:
         "end_acceleration": 90 / 21,
         "speed": (10 * 2 + 5) / 11 / 21,
     }
-    assert found == pytest.approx(expected, rel=1e-6)
+    assert numbers == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("group", ["left_arm", "lower_body"])
 def test_what_is_held_comes_out_as_given(group: str) -> None:
     """The window's places to float32, the motion's rotations exactly; what is free stays what the network says."""
     trial = trials.prepare(protocol(), count=1)
-    found = behaviour.held_numbers(predictor(), trial, group, samples=2, seed=0)
-    assert found["held"] < 1e-5
-    assert found["rotations"] < 1e-12
-    assert found["free"] > 0 < found["given"]
+    numbers = behaviour.held_numbers(predictor(), trial, group, samples=2, seed=0)
+    assert numbers["held"] < 1e-5
+    assert numbers["rotations"] < 1e-12
+    assert numbers["free"] > 0 < numbers["given"]
 
 
 def test_a_switch_arrives_at_the_target_itself(tmp_path: Path) -> None:
@@ -282,16 +282,16 @@ def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:
     ]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     assert "second 4" in capsys.readouterr().out
-    said = (tmp_path / "out" / "horizon.md").read_text()
+    page = (tmp_path / "out" / "horizon.md").read_text()
     assert (
         "motionloom evaluate study horizon --weights tiny.safetensors --data DIR --windows 2 --out FOLDER --quick"
-        in said
+        in page
     )
     filler = runpy.run_path(str(Path(__file__).parents[4] / "tools" / "fill_readme.py"))
-    (place,) = filler["PLACE"].finditer(said)
+    (place,) = filler["PLACE"].finditer(page)
     assert place[4] == f"tiny {weights_digest(weights)[:12]}"
-    assert said.startswith(f"# {studies.TITLES['horizon']}\n\n<!-- figures; of ")
-    assert said.endswith("![A long horizon: window after window](horizon.png)\n<!-- end -->\n")
+    assert page.startswith(f"# {studies.TITLES['horizon']}\n\n<!-- figures; of ")
+    assert page.endswith("![A long horizon: window after window](horizon.png)\n<!-- end -->\n")
     assert (tmp_path / "out" / "horizon.png").is_file()
     assert main([*words, "--samples", "0", "--out", str(tmp_path / "bad")]) == 2
     assert "samples must be" in capsys.readouterr().err

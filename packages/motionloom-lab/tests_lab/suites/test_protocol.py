@@ -48,9 +48,9 @@ def test_a_selection_of_nothing_is_a_mistake(change: dict) -> None:
 @given(seed=st.integers(0, 2**40), replications=st.integers(2, 6), rows=st.integers(1, 50), more=st.integers(1, 50))
 def test_no_seed_is_drawn_twice_in_a_run(seed: int, replications: int, rows: int, more: int) -> None:
     one = Protocol(seed=seed, replications=replications)
-    drawn = [s for r in range(replications) for s in (*one.seeds(r, rows), *one.seeds(r, more, after=rows))]
-    assert len(set(drawn)) == len(drawn)
-    assert min(drawn) == seed
+    seeds = [s for r in range(replications) for s in (*one.seeds(r, rows), *one.seeds(r, more, after=rows))]
+    assert len(set(seeds)) == len(seeds)
+    assert min(seeds) == seed
 
 
 def test_described_says_whatever_changes_a_number() -> None:
@@ -69,11 +69,11 @@ def test_described_says_whatever_changes_a_number() -> None:
         "spacing": "logsnr",
     }
 
-    def said(protocol: Protocol, selection: Selection) -> str:
+    def description(protocol: Protocol, selection: Selection) -> str:
         return json.dumps(protocol.described(selection, data="made up", items=40, evaluator="judge"))
 
-    plain = said(Protocol(), Selection())
-    assert all(said(replace(Protocol(), **{k: v}), Selection()) != plain for k, v in changes.items())
+    plain = description(Protocol(), Selection())
+    assert all(description(replace(Protocol(), **{k: v}), Selection()) != plain for k, v in changes.items())
     others = {
         "splits": ("val",),
         "sources": (),
@@ -83,7 +83,7 @@ def test_described_says_whatever_changes_a_number() -> None:
         "unit": 1,
         "shorter_third": True,
     }
-    assert all(said(Protocol(), replace(Selection(), **{k: v})) != plain for k, v in others.items())
+    assert all(description(Protocol(), replace(Selection(), **{k: v})) != plain for k, v in others.items())
 
 
 def test_what_a_resumed_run_must_agree_in_leaves_out_only_how_long_it_runs() -> None:

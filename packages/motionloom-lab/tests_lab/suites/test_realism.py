@@ -27,20 +27,20 @@ def test_only_held_out_captioned_clips_of_usable_length_are_taken_and_spread() -
 
 def test_orders_group_equal_lengths_in_batches() -> None:
     clips = [clip(f"{k}", seconds=3.0 if k % 2 else 4.1) for k in range(6)]
-    found = realism.orders(clips, batch=2)
-    assert [(o.seconds, len(o.prompts)) for o in found] == [(3.0, 2), (3.0, 1), (4.0, 2), (4.0, 1)]
+    batches = realism.orders(clips, batch=2)
+    assert [(o.seconds, len(o.prompts)) for o in batches] == [(3.0, 2), (3.0, 1), (4.0, 2), (4.0, 1)]
 
 
 def test_seeds_never_repeat_between_orders() -> None:
-    seen: list[int] = []
+    seeds: list[int] = []
 
     def fake(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[np.ndarray], float]:
-        seen.extend(range(seed, seed + len(prompts)))
+        seeds.extend(range(seed, seed + len(prompts)))
         return [standing(seconds)] * len(prompts), FPS
 
-    made, _ = realism.run(Run(), realism.everyday(40), generate=fake, seed=5)
-    assert len(made) == 40
-    assert seen == list(range(5, 45))
+    clips, _ = realism.run(Run(), realism.everyday(40), generate=fake, seed=5)
+    assert len(clips) == 40
+    assert seeds == list(range(5, 45))
 
 
 def test_a_copy_of_the_real_clips_passes_and_a_sliding_one_does_not() -> None:
@@ -62,12 +62,12 @@ def test_the_table_has_a_row_for_each_number() -> None:
 
 def test_the_reference_counts_examples_and_false_alarms() -> None:
     clips = [clip("w1"), clip("w2", split="train"), RealClip("s", "made", "train", ("nods",), standing())]
-    found = reference(clips)
-    assert found["checks"]["walk forward"] == {"held_out": "1/1", "all": "2/2", "related": "0/0", "others": "0/1"}
-    assert found["checks"]["stand still"]["others"] == "1/3"
-    assert found["confusion"]["walk forward"]["walk forward"] == 1
-    assert len(rates(found)) == 21
-    assert confusion_table(found)[1][0] == "1 walk forward"
+    numbers = reference(clips)
+    assert numbers["checks"]["walk forward"] == {"held_out": "1/1", "all": "2/2", "related": "0/0", "others": "0/1"}
+    assert numbers["checks"]["stand still"]["others"] == "1/3"
+    assert numbers["confusion"]["walk forward"]["walk forward"] == 1
+    assert len(rates(numbers)) == 21
+    assert confusion_table(numbers)[1][0] == "1 walk forward"
 
 
 def test_the_shipped_reference_belongs_to_these_checks_and_numbers() -> None:

@@ -94,10 +94,10 @@ def test_a_kill_between_report_and_mark_is_measured_again(
 
 
 def test_a_suites_own_parts_are_found_again_and_never_those_of_other_settings(job: Job, tmp_path: Path) -> None:
-    seen: list[Path] = []
+    folders: list[Path] = []
 
     def run(job: Job, settings: Mapping[str, Any]) -> Report:
-        seen.append(job.folder)
+        folders.append(job.folder)
         return Counted("parts")(job, settings)
 
     suite = replace(Counted("parts").suite(), run=run)
@@ -106,7 +106,7 @@ def test_a_suites_own_parts_are_found_again_and_never_those_of_other_settings(jo
     run_all(job, tmp_path / "out", [suite])
     Path(job.weights).write_bytes(b"other weights")
     run_all(job, tmp_path / "out", [suite])
-    assert seen[0] == seen[1] != seen[2]
+    assert folders[0] == folders[1] != folders[2]
 
 
 @pytest.mark.parametrize("change", ["weights", "settings", "data", "report", "mark", "again", "files"])
@@ -214,12 +214,12 @@ def test_every_suite_that_reads_data_asks_what_it_needs(tmp_path: Path) -> None:
 def test_the_command_ends_well_where_suites_were_only_skipped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said: dict[str, Outcome] = {
+    outcomes: dict[str, Outcome] = {
         "skipped": Outcome(SUITES[0], None, "skipped", "there are no pairs"),
         "failed": Outcome(SUITES[0], None, "failed", "no motion"),
     }
     for state, code in (("skipped", 0), ("failed", 2)):
-        monkeypatch.setattr("motionloom_lab.suites.everything.run_all", lambda *a, s=state, **k: [said[s]])
+        monkeypatch.setattr("motionloom_lab.suites.everything.run_all", lambda *a, s=state, **k: [outcomes[s]])
         assert main(["evaluate", "all", "--quick", "--out", str(tmp_path)]) == code
         assert f"{SUITES[0].name}: {state}: " in capsys.readouterr().out
 
@@ -281,11 +281,11 @@ def test_suites_with_a_judge_ask_for_what_was_said(
 
     module, function = place.rsplit(".", 1)
     signature = inspect.signature(getattr(importlib.import_module(module), function))
-    asked: dict[str, Any] = {}
+    calls: dict[str, Any] = {}
 
     def fake(*args: Any, **named: Any) -> Report:
-        asked.update(signature.bind(*args, **named).arguments)
-        return replace(made(name), command=asked["run"].command if "run" in asked else "another")
+        calls.update(signature.bind(*args, **named).arguments)
+        return replace(report_of(name), command=calls["run"].command if "run" in calls else "another")
 
     monkeypatch.setattr(place, fake)
     monkeypatch.setattr("motionloom_lab.evaluator.evaluators.load_evaluator", lambda said: f"judge {said}")
@@ -293,14 +293,14 @@ def test_suites_with_a_judge_ask_for_what_was_said(
     job = Job("default", tools, data=tmp_path, evaluator=str(tmp_path / "mine.tar"), quick=True)
     (tmp_path / "mine.tar").write_bytes(b"abc")
     (suite,) = chosen([name])
-    found = suite.run(job, suite.settings(True))
+    table = suite.run(job, suite.settings(True))
     words = f"motionloom evaluate all --only {name} --weights default --data SET --evaluator mine.tar --quick"
-    assert (found.suite, found.command) == (name, words)
-    judge = asked["run"].evaluator if name == "text" else asked["evaluator"]
+    assert (table.suite, table.command) == (name, words)
+    judge = calls["run"].evaluator if name == "text" else calls["evaluator"]
     assert judge == (job.evaluator if name == "text" else f"judge {job.evaluator}")
     assert suite.judged == (name != "evaluator")
     if name == "text":
-        assert (asked["run"].weights, asked["run"].data, asked["protocol"].replications) == ("default", tmp_path, 2)
+        assert (calls["run"].weights, calls["run"].data, calls["protocol"].replications) == ("default", tmp_path, 2)
 
 
 def test_a_judged_report_says_which_evaluator_file_it_was(job: Job, tmp_path: Path) -> None:
@@ -321,25 +321,25 @@ def test_obedience_as_shares_of_seeds() -> None:
         return [standing(seconds) if (seed + k) % 2 else walking(1.2, seconds) for k in range(len(prompts))], FPS
 
     checks = [check("walk forward"), check("stand still")]
-    found = obey.run(Run(), checks, generate=half, seeds=4, paraphrases=True)
-    made = physical.obedience_report(found, checks, run=Run(command="c"), settings={"seeds": 4})
-    rows = {row.name: row.values for row in made.rows}
+    results = obey.run(Run(), checks, generate=half, seeds=4, paraphrases=True)
+    table = physical.obedience_report(results, checks, run=Run(command="c"), settings={"seeds": 4})
+    rows = {row.name: row.values for row in table.rows}
     assert rows["a person walks forward"]["obeyed"] == Value(0.5, count=4)
     assert rows["a person walks forward"]["real"] == Value(111 / 113, count=113)
     assert rows["a person walks forward"]["reworded"] == Value(0.5, count=4 * len(checks[0].paraphrases))
     assert (rows["all prompts"]["obeyed"].mean, rows["all prompts"]["obeyed"].count) == (0.5, 8)
     other = sum(len(one.paraphrases) for one in checks)
     assert rows["all prompts"]["reworded"] == Value(0.5, count=4 * other)
-    assert made.protocol["checks"] == obey.fingerprint(checks)
-    assert "| a person walks forward | 0.50 (2/4) |" in markdown(made)
+    assert table.protocol["checks"] == obey.fingerprint(checks)
+    assert "| a person walks forward | 0.50 (2/4) |" in markdown(table)
 
 
 def test_realisms_means_are_those_of_the_metric_and_its_intervals_shrink_with_clips() -> None:
     clips = [walking(speed, 3.0) for speed in np.linspace(0.8, 1.6, 8)]
-    found = physical.realism_value(clips, FPS)
-    assert {name: value.mean for name, value in found.items()} == pytest.approx(average(clips, FPS))
+    values = physical.realism_value(clips, FPS)
+    assert {name: value.mean for name, value in values.items()} == pytest.approx(average(clips, FPS))
     more = physical.realism_value(clips * 4, FPS)
-    assert more["speed_median"].interval == pytest.approx(found["speed_median"].interval / 2, rel=0.2)
+    assert more["speed_median"].interval == pytest.approx(values["speed_median"].interval / 2, rel=0.2)
     assert np.isnan(physical.realism_value(clips[:1], FPS)["jerk"].interval)
 
 
@@ -347,9 +347,9 @@ def test_the_interval_of_a_plain_mean_is_the_textbooks() -> None:
     """Clips of equal length: the bootstrap must agree with 1.96 sigma / sqrt(n) within its own noise."""
     speeds = np.random.default_rng(3).uniform(0.6, 1.8, size=24)
     clips = [moved(standing(2.0), np.arange(40)[:, None] / FPS * np.array([0, 0, v])) for v in speeds]
-    found = physical.realism_value(clips, FPS)["speed_median"]
-    assert found.mean == pytest.approx(speeds.mean(), rel=0.01)
-    assert found.interval == pytest.approx(1.96 * speeds.std(ddof=1) / np.sqrt(24), rel=0.15)
+    speed = physical.realism_value(clips, FPS)["speed_median"]
+    assert speed.mean == pytest.approx(speeds.mean(), rel=0.01)
+    assert speed.interval == pytest.approx(1.96 * speeds.std(ddof=1) / np.sqrt(24), rel=0.15)
 
 
 def test_clips_of_other_lengths_that_move_alike_have_no_spread() -> None:
@@ -363,8 +363,8 @@ def test_realism_beside_real_clips_and_beside_shipped_numbers() -> None:
     beside = physical.realism_report({"generated": clips}, FPS, clips, run=Run(), protocol={})
     assert [row.name for row in beside.rows] == ["real", "generated"]
     assert beside.rows[1].values["speed_distance"].mean == pytest.approx(0.0)
-    wanted, real, about = physical.realism_orders(None, 20)
-    assert sum(len(order.prompts) for order in wanted) == 20
+    orders, real, about = physical.realism_orders(None, 20)
+    assert sum(len(order.prompts) for order in orders) == 20
     alone = physical.realism_report({"generated": clips}, FPS, real, run=Run(), protocol=about)
     assert [c.name for c in alone.columns][: len(NUMBERS)] == [n.name for n in NUMBERS]
 
@@ -382,13 +382,13 @@ def test_the_realism_report_holds_bodies_against_recorded_people() -> None:
 
 def test_speed_has_its_targets_and_the_machine_in_the_protocol() -> None:
     entry = {"name": "generate, start to BVH", "value": 3.2, "unit": "s", "target": "< 8", "passes": True, "note": "n"}
-    found = {"machine": {"device": "x86", "load": 2.0}, "quick": False, "entries": [entry]}
-    made = physical.speed_report(found, run=Run(command="c"))
-    assert made.protocol["machine"] == {"device": "x86"}  # load is no setting
-    assert made.columns[0].better == "down"
-    assert made.rows[0].values[made.columns[0].name].mean == 3.2
-    assert any("busy" in note for note in made.notes)
-    assert encode(made)
+    results = {"machine": {"device": "x86", "load": 2.0}, "quick": False, "entries": [entry]}
+    table = physical.speed_report(results, run=Run(command="c"))
+    assert table.protocol["machine"] == {"device": "x86"}  # load is no setting
+    assert table.columns[0].better == "down"
+    assert table.rows[0].values[table.columns[0].name].mean == 3.2
+    assert any("busy" in note for note in table.notes)
+    assert encode(table)
 
 
 # ---- the page of results -------------------------------------------------------------------------------------------
@@ -396,58 +396,58 @@ def test_speed_has_its_targets_and_the_machine_in_the_protocol() -> None:
 PAGE = "# Results\n\nwords\n\n<!-- suite one -->\nNot measured yet.\n<!-- end -->\n\nmore words\n"
 
 
-def made(suite: str = "one", number: float = 1.0, *, quick: bool = False) -> Report:
+def report_of(suite: str = "one", number: float = 1.0, *, quick: bool = False) -> Report:
     rows = (Row("ours", {"fid": Value(number)}),)
     protocol = {"quick": True} if quick else {}
     return Report(suite, f"Title {suite}", "motionloom evaluate all", protocol, (Column("fid", "FID", "", ""),), rows)
 
 
 def test_a_page_is_filled_at_its_marks_and_filling_twice_changes_nothing() -> None:
-    once, _ = results.fill(PAGE, [made()])
+    once, _ = results.fill(PAGE, [report_of()])
     assert "| ours | 1.000 |" in once
     assert "motionloom evaluate all" in once
     assert "# Title one" not in once
     assert once.startswith("# Results\n\nwords\n")
     assert once.endswith("<!-- end -->\n\nmore words\n")
-    assert results.fill(once, [made()])[0] == once
-    assert "| ours | 2.000 |" in results.fill(once, [made(number=2.0)])[0]
+    assert results.fill(once, [report_of()])[0] == once
+    assert "| ours | 2.000 |" in results.fill(once, [report_of(number=2.0)])[0]
 
 
 def test_the_page_says_of_which_weight_files_a_suite_is() -> None:
     files = {"default": "0123456789ab", "duet": "ba9876543210"}
-    once, _ = results.fill(PAGE, [replace(made(), protocol={"files": files})])
+    once, _ = results.fill(PAGE, [replace(report_of(), protocol={"files": files})])
     assert "<!-- suite one; of default 0123456789ab, duet ba9876543210 -->" in once
-    again, _ = results.fill(once, [replace(made(), protocol={"files": {"default": "ffffffffffff"}})])
+    again, _ = results.fill(once, [replace(report_of(), protocol={"files": {"default": "ffffffffffff"}})])
     assert "<!-- suite one; of default ffffffffffff -->" in again
     assert "0123456789ab" not in again
 
 
 def test_a_suite_without_a_place_gets_one_once() -> None:
-    once, _ = results.fill(PAGE, [made("new")])
+    once, _ = results.fill(PAGE, [report_of("new")])
     assert "## Title new\n\n<!-- suite new -->" in once
-    assert results.fill(once, [made("new")])[0] == once
+    assert results.fill(once, [report_of("new")])[0] == once
     assert "Not measured yet." in once
 
 
 def test_quick_numbers_never_replace_full_ones_on_the_page_unless_asked() -> None:
-    quick, left = results.fill(PAGE, [made(number=7.0, quick=True)])
+    quick, left = results.fill(PAGE, [report_of(number=7.0, quick=True)])
     assert ("7.000" in quick, left) == (True, [])
-    full, _ = results.fill(quick, [made()])
+    full, _ = results.fill(quick, [report_of()])
     assert "7.000" not in full
-    same, left = results.fill(full, [made(number=7.0, quick=True)])
+    same, left = results.fill(full, [report_of(number=7.0, quick=True)])
     assert (same, left) == (full, ["one"])
-    assert "7.000" in results.fill(full, [made(number=7.0, quick=True)], again=True)[0]
+    assert "7.000" in results.fill(full, [report_of(number=7.0, quick=True)], again=True)[0]
 
 
 def test_a_note_cannot_end_its_place() -> None:
-    tricky = replace(made(), notes=("<!-- end -->", "<!-- suite two -->"))
+    tricky = replace(report_of(), notes=("<!-- end -->", "<!-- suite two -->"))
     once, _ = results.fill(PAGE, [tricky])
     assert results.fill(once, [tricky])[0] == once
 
 
 def test_the_shipped_page_has_a_place_for_every_suite() -> None:
     text = (Path(__file__).parents[4] / "docs" / "results.md").read_text(encoding="utf-8")
-    assert [found[2] for found in results.PLACE.finditer(text)] == [suite.name for suite in SUITES]
+    assert [match[2] for match in results.PLACE.finditer(text)] == [suite.name for suite in SUITES]
 
 
 def test_outcomes_do_not_fail_unless_said() -> None:

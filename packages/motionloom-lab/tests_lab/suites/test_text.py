@@ -27,10 +27,10 @@ def trial(
     return text.prepare(painter, judge, text_reference.measure(items, judge, Selection()), protocol)
 
 
-def values(found: Report, row: str) -> dict[str, float]:
-    kept = found.row(row)
-    assert kept is not None
-    return {name: value.mean for name, value in kept.values.items()}
+def values(results: Report, row: str) -> dict[str, float]:
+    line = results.row(row)
+    assert line is not None
+    return {name: value.mean for name, value in line.values.items()}
 
 
 def test_real_motions_match_their_words_and_themselves() -> None:
@@ -44,11 +44,11 @@ def test_real_motions_match_their_words_and_themselves() -> None:
 def test_shuffled_captions_find_their_motion_by_chance() -> None:
     """With captions dealt out anew, k of 8 motions are hit, within four standard errors of 6,400 tries."""
     many = trial(Painter(), replace(SMALL, replications=20), people=320)
-    found = [text.of_real(many, r, shuffled=True) for r in range(20)]
+    rows = [text.of_real(many, r, shuffled=True) for r in range(20)]
     for k, name in enumerate(("r1", "r2", "r3"), start=1):
-        share = np.mean([numbers[name] for numbers in found])
+        share = np.mean([numbers[name] for numbers in rows])
         assert share == pytest.approx(k / 8, abs=4 * np.sqrt(k / 8 * (1 - k / 8) / 6400))
-    apart = np.mean([numbers["mm_dist"] for numbers in found])
+    apart = np.mean([numbers["mm_dist"] for numbers in rows])
     assert apart == pytest.approx(text.of_chance(many)["mm_dist"], rel=0.03)
 
 
@@ -58,10 +58,10 @@ def test_chance_is_k_of_the_batch() -> None:
 
 
 def test_a_perfect_generator_scores_as_real() -> None:
-    found = text.measure(trial(Painter()))
-    real, made = values(found, "real"), values(found, "default, 2 steps")
-    assert {k: made[k] for k in MEASURED} == pytest.approx({k: real[k] for k in MEASURED}, abs=1e-7)
-    assert made["multimodality"] == 0
+    results = text.measure(trial(Painter()))
+    real, numbers = values(results, "real"), values(results, "default, 2 steps")
+    assert {k: numbers[k] for k in MEASURED} == pytest.approx({k: real[k] for k in MEASURED}, abs=1e-7)
+    assert numbers["multimodality"] == 0
 
 
 def test_a_generator_that_misses_by_sigma_is_off_by_the_length_of_its_noise() -> None:
@@ -77,29 +77,29 @@ def test_a_generator_that_misses_by_sigma_is_off_by_the_length_of_its_noise() ->
 def test_multimodality_is_the_distance_of_two_draws() -> None:
     """Two independent draws of noise sigma are sqrt(2) sigma chi_d apart; pairing one with itself would lower it."""
     sigma = 0.5
-    found = text._several(trial(Painter(sigma)), 0, 4, captions=20, samples=20)
+    distance = text._several(trial(Painter(sigma)), 0, 4, captions=20, samples=20)
     chi = np.linalg.norm(np.random.default_rng(1).standard_normal((200_000, WIDTH)), axis=1).mean()
-    assert found == pytest.approx(np.sqrt(2) * sigma * chi, rel=0.06)
+    assert distance == pytest.approx(np.sqrt(2) * sigma * chi, rel=0.06)
     pairs_of_two = text._several(trial(Painter(sigma)), 0, 4, captions=32, samples=2)
     assert pairs_of_two == pytest.approx(np.sqrt(2) * sigma * chi, rel=0.2)
 
 
 def test_a_judge_who_sees_nothing_finds_by_chance_and_never_by_equal_words() -> None:
     """Equal embeddings are no hits, whatever order they are sorted in."""
-    found = text.of_generated(trial(Painter(), judge=Judge(blind=True)), 0, 2)
-    assert (found["r1"], found["r3"], found["r3_same"]) == (pytest.approx(1 / 8), pytest.approx(3 / 8), 0)
+    numbers = text.of_generated(trial(Painter(), judge=Judge(blind=True)), 0, 2)
+    assert (numbers["r1"], numbers["r3"], numbers["r3_same"]) == (pytest.approx(1 / 8), pytest.approx(3 / 8), 0)
 
 
 def test_motions_of_the_same_words_count_as_hits_only_in_their_own_column() -> None:
     """Texts 0 and 1 are alike and their motions lie crosswise: the published count misses both, the other hits both."""
     texts = np.array([[0.0], [0.1], [10.0], [20.0]])
     motions = np.array([[0.1], [0.0], [10.0], [20.0]])
-    said = ["A man walks.", "a man  walks", "sits", "jumps"]
+    captions = ["A man walks.", "a man  walks", "sits", "jumps"]
     assert text.r_precision(texts, motions, top=1, batch=4)[0] == 0.5
-    assert text.same_words_precision(texts, motions, said, top=1, batch=4) == 1
+    assert text.same_words_precision(texts, motions, captions, top=1, batch=4) == 1
     other = ["a man walks", "a man runs", "sits", "jumps"]
     assert text.same_words_precision(texts, motions, other, top=1, batch=4) == 0.5
-    assert text.same_words_precision(texts, motions, said, top=1, batch=2) == 1
+    assert text.same_words_precision(texts, motions, captions, top=1, batch=2) == 1
 
 
 def test_no_two_motions_share_a_seed_and_step_counts_share_theirs() -> None:
@@ -144,11 +144,11 @@ def test_captions_of_published_length_are_read_beside_generated_motions_only() -
             assert kind == "published"
             return Judge(blind=True)
 
-    found = text.measure(trial(Painter(), replace(SMALL, caption_length="published"), judge=Padding()))
-    assert values(found, "real")["mm_dist"] == pytest.approx(0, abs=1e-9)
+    results = text.measure(trial(Painter(), replace(SMALL, caption_length="published"), judge=Padding()))
+    assert values(results, "real")["mm_dist"] == pytest.approx(0, abs=1e-9)
     lengths = [np.linalg.norm(place(k)) for k in range(32)]
-    assert values(found, "default, 2 steps")["mm_dist"] == pytest.approx(np.mean(lengths))
-    assert "22" in found.protocol["caption length"]
+    assert values(results, "default, 2 steps")["mm_dist"] == pytest.approx(np.mean(lengths))
+    assert "22" in results.protocol["caption length"]
     with pytest.raises(MotionloomError, match="caption length"):
         trial(Painter(), replace(SMALL, caption_length="published"))
 
@@ -167,9 +167,11 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_stopped(tmp_path: Path)
     assert third.calls == []
 
 
-def _timeless(found: Report) -> str:
-    rows = [replace(r, values={k: v for k, v in r.values.items() if k not in ("ms", "per_second")}) for r in found.rows]
-    return json.dumps(report.encode(replace(found, rows=tuple(rows))))
+def _timeless(results: Report) -> str:
+    rows = [
+        replace(r, values={k: v for k, v in r.values.items() if k not in ("ms", "per_second")}) for r in results.rows
+    ]
+    return json.dumps(report.encode(replace(results, rows=tuple(rows))))
 
 
 def test_more_replications_go_on_from_fewer_and_other_settings_do_not(tmp_path: Path) -> None:
@@ -195,13 +197,13 @@ def test_a_damaged_part_is_one_clear_sentence(tmp_path: Path, damage: str) -> No
 
 
 def test_intervals_are_over_replications_and_real_numbers_that_never_change_have_none() -> None:
-    found = text.measure(trial(Painter(0.6)))
-    made, real = found.row("default, 4 steps"), found.row("real")
-    assert made is not None
+    results = text.measure(trial(Painter(0.6)))
+    numbers, real = results.row("default, 4 steps"), results.row("real")
+    assert numbers is not None
     assert real is not None
-    assert made.values["r1"].count == 3
-    assert made.values["multimodality"].count == 2
-    assert made.values["r1"].interval > 0
+    assert numbers.values["r1"].count == 3
+    assert numbers.values["multimodality"].count == 2
+    assert numbers.values["r1"].interval > 0
     assert real.values["jerk"].count == real.values["fid"].count == 1
     assert "multimodality" not in real.values
 
@@ -212,10 +214,10 @@ def test_too_few_items_for_a_batch_is_a_mistake() -> None:
 
 
 def test_the_report_can_be_read_again_and_its_published_rows_stand_apart() -> None:
-    found = text.measure(trial(Painter()), run=Run(command="motionloom evaluate text"))
-    plain = json.loads(json.dumps(report.encode(found)))
+    results = text.measure(trial(Painter()), run=Run(command="motionloom evaluate text"))
+    plain = json.loads(json.dumps(report.encode(results)))
     assert report.encode(report.decode(plain)) == plain
-    page = report.markdown(found)
+    page = report.markdown(results)
     assert page.index("default, 4 steps") < page.index("other data") < page.index("DoubleTake, first take only")
 
 
@@ -232,9 +234,9 @@ def test_published_rows_are_marked_and_possible() -> None:
 
 
 def test_numbers_say_what_was_measured_and_how_small_samples_bias_them() -> None:
-    found = text.measure(trial(Painter()))
-    assert found.protocol["items"] == 32
-    wanted = {
+    results = text.measure(trial(Painter()))
+    assert results.protocol["items"] == 32
+    expectations = {
         "data",
         "split",
         "items",
@@ -251,8 +253,8 @@ def test_numbers_say_what_was_measured_and_how_small_samples_bias_them() -> None
         "interval",
         "evaluator",
     }
-    assert wanted <= found.protocol.keys()
-    assert "16 each" in " ".join(found.notes)
+    assert expectations <= results.protocol.keys()
+    assert "16 each" in " ".join(results.notes)
 
 
 def test_a_run_is_known_again_by_its_items_and_not_by_digits_that_threads_change() -> None:

@@ -42,8 +42,8 @@ class Maker:
         if self.stop_after is not None and len(self.calls) >= self.stop_after:
             raise KeyboardInterrupt
         self.calls.append((tuple(prompts), tuple(frames), seed))
-        said = np.concatenate([features(place(number_in(p)), n) for p, n in zip(prompts, frames, strict=True)])
-        return Long(said, self.path(frames))
+        numbers = np.concatenate([features(place(number_in(p)), n) for p, n in zip(prompts, frames, strict=True)])
+        return Long(numbers, self.path(frames))
 
 
 def trial(how: Transitions = HOW, *, people: int = 40, crops: bool = True) -> transitions.SeamTrial:
@@ -81,26 +81,26 @@ def test_every_interval_is_long_enough_for_double_take_and_not_beyond_the_data()
 def test_perfect_segments_match_their_words_and_lie_where_real_ones_lie() -> None:
     """R@3 is 1, MM-Dist 0; FID is that of the same people among all, as in the real row."""
     world = trial()
-    made, real = transitions.of_method(world, Maker(), 0), transitions.of_real(world, 0)
-    assert made["r3"] == 1
-    assert made["mm_dist"] == pytest.approx(0, abs=1e-9)
-    assert made["fid"] == pytest.approx(real["fid"])
-    assert made["diversity"] == pytest.approx(real["diversity"])
+    numbers, real = transitions.of_method(world, Maker(), 0), transitions.of_real(world, 0)
+    assert numbers["r3"] == 1
+    assert numbers["mm_dist"] == pytest.approx(0, abs=1e-9)
+    assert numbers["fid"] == pytest.approx(real["fid"])
+    assert numbers["diversity"] == pytest.approx(real["diversity"])
 
 
 def test_a_window_sees_both_its_neighbours() -> None:
     """The judge reads the mean of each window: half of one person and half of the next."""
-    world, seen = trial(), []
+    world, calls = trial(), []
     judge = world.evaluator
     read = judge.motions
-    judge.motions = lambda parts: seen.append(parts) or read(parts)  # type: ignore[method-assign]
+    judge.motions = lambda parts: calls.append(parts) or read(parts)  # type: ignore[method-assign]
     maker = Maker()
     transitions.of_method(world, maker, 0)
     prompts = maker.calls[0][0]
-    first = seen[1][0][:, HIDDEN].mean(0)
+    first = calls[1][0][:, HIDDEN].mean(0)
     frames = maker.calls[0][1]
-    assert [len(part) for part in seen[0][:8]] == [frames[0] - 10, *(n - 20 for n in frames[1:7]), frames[7] - 10]
-    assert len(seen[1]) == HOW.seams
+    assert [len(part) for part in calls[0][:8]] == [frames[0] - 10, *(n - 20 for n in frames[1:7]), frames[7] - 10]
+    assert len(calls[1]) == HOW.seams
     assert first == pytest.approx((place(number_in(prompts[0])) + place(number_in(prompts[1]))) / 2)
 
 
@@ -113,15 +113,15 @@ def test_a_jump_at_the_seam_has_the_jerk_and_the_step_of_a_step_function() -> No
             p[seam:, :, 0] += 0.25
         return p
 
-    found = transitions.of_method(replace(trial(), mean_jerk=0.0), Maker(jumping), 0)
-    assert found["pj"] == pytest.approx(0.5)
-    assert found["auj"] == pytest.approx(1.0)
-    assert found["auj_own"] == pytest.approx(1.0)
-    assert found["step"] == pytest.approx(250)
+    numbers = transitions.of_method(replace(trial(), mean_jerk=0.0), Maker(jumping), 0)
+    assert numbers["pj"] == pytest.approx(0.5)
+    assert numbers["auj"] == pytest.approx(1.0)
+    assert numbers["auj_own"] == pytest.approx(1.0)
+    assert numbers["step"] == pytest.approx(250)
     small = JERK_HUMANML3D
-    assert found["auj_humanml3d"] == pytest.approx(0.25 * 4 - 3 * small + 54 * small)
-    assert found["seam_jerk"] == pytest.approx(0.25 * 4 / 57 * FPS**3)
-    assert found["inside_jerk"] == pytest.approx(0, abs=1e-6)
+    assert numbers["auj_humanml3d"] == pytest.approx(0.25 * 4 - 3 * small + 54 * small)
+    assert numbers["seam_jerk"] == pytest.approx(0.25 * 4 / 57 * FPS**3)
+    assert numbers["inside_jerk"] == pytest.approx(0, abs=1e-6)
 
 
 def test_what_shakes_alike_everywhere_has_no_area_of_its_own() -> None:
@@ -132,10 +132,10 @@ def test_what_shakes_alike_everywhere_has_no_area_of_its_own() -> None:
         p[::2, :, 0] += 0.01
         return p
 
-    found = transitions.of_method(trial(), Maker(shaking), 0)
-    assert found["pj"] == pytest.approx(0.04)
-    assert found["auj_own"] == pytest.approx(0, abs=1e-9)
-    assert found["auj"] == pytest.approx(57 * abs(0.04 - trial().mean_jerk))
+    numbers = transitions.of_method(trial(), Maker(shaking), 0)
+    assert numbers["pj"] == pytest.approx(0.04)
+    assert numbers["auj_own"] == pytest.approx(0, abs=1e-9)
+    assert numbers["auj"] == pytest.approx(57 * abs(0.04 - trial().mean_jerk))
 
 
 def test_skate_is_counted_on_its_own_side_of_the_window() -> None:
@@ -161,7 +161,7 @@ def test_skate_is_counted_on_its_own_side_of_the_window() -> None:
 
 def test_all_ways_get_the_same_prompts_lengths_and_seeds_and_no_item_twice() -> None:
     first, second = Maker(), Maker()
-    found = transitions.measure(trial(), {"ours": first, "slerp": second})
+    table = transitions.measure(trial(), {"ours": first, "slerp": second})
     assert first.calls == second.calls
     assert len(first.calls) == HOW.replications * HOW.unfoldings
     assert len({seed for _, _, seed in first.calls}) == 4
@@ -171,18 +171,18 @@ def test_all_ways_get_the_same_prompts_lengths_and_seeds_and_no_item_twice() -> 
     lengths = [n for _, frames, _ in first.calls for n in frames]
     assert min(lengths) >= HOW.shortest
     assert max(lengths) <= HOW.longest
-    assert [row.name for row in found.rows[:3]] == ["real", titled("ours", 24), titled("slerp", 24)]
-    assert found.rows[1].values["auj"].count == 2
+    assert [row.name for row in table.rows[:3]] == ["real", titled("ours", 24), titled("slerp", 24)]
+    assert table.rows[1].values["auj"].count == 2
 
 
 def test_a_report_has_the_published_rows_beside_and_can_be_read_again() -> None:
-    found = transitions.measure(trial(), {"ours": Maker()}, run=Run(command="motionloom evaluate transitions"))
-    again = report.decode(json.loads(json.dumps(report.encode(found))))
+    table = transitions.measure(trial(), {"ours": Maker()}, run=Run(command="motionloom evaluate transitions"))
+    again = report.decode(json.loads(json.dumps(report.encode(table))))
     assert again.row("real") is not None
     elsewhere = {row.name for row in again.rows if row.measured_on}
     assert {"TEACH", "DoubleTake", "DoubleTake, first take only"} <= elsewhere
-    assert {c.name for c in found.columns} == set(found.rows[1].values)  # nothing is declared that is not measured
-    assert "half a handshake at each seam" in report.markdown(found)
+    assert {c.name for c in table.columns} == set(table.rows[1].values)  # nothing is declared that is not measured
+    assert "half a handshake at each seam" in report.markdown(table)
 
 
 def test_a_stopped_run_goes_on_with_the_next_replication(tmp_path: Path) -> None:
@@ -190,20 +190,20 @@ def test_a_stopped_run_goes_on_with_the_next_replication(tmp_path: Path) -> None
     with pytest.raises(KeyboardInterrupt):
         transitions.measure(world, {"ours": Maker(stop_after=HOW.unfoldings)}, parts=parts)
     rest = Maker()
-    found = transitions.measure(world, {"ours": rest}, parts=parts)
+    table = transitions.measure(world, {"ours": rest}, parts=parts)
     whole = transitions.measure(world, {"ours": Maker()})
     assert len(rest.calls) == HOW.unfoldings
-    a, b = (dict(one.rows[1].values) for one in (found, whole))
+    a, b = (dict(one.rows[1].values) for one in (table, whole))
     assert {k: v.mean for k, v in a.items() if k != "cost"} == {k: v.mean for k, v in b.items() if k != "cost"}
 
 
 def test_without_recordings_the_shipped_numbers_stand_in_the_real_row() -> None:
     how = replace(HOW, unfoldings=1)  # 7 windows, which were measured
-    found = transitions.of_real(trial(how, crops=False), 0)
-    said = json.loads(real_seams.shipped_file().read_text())
-    assert found["pj"] == said["jerks"]["7"]["pj"]
-    assert found["seam_share"] == said["physical"]["share"]
-    assert "transition_fid" not in found
+    numbers = transitions.of_real(trial(how, crops=False), 0)
+    shipped = json.loads(real_seams.shipped_file().read_text())
+    assert numbers["pj"] == shipped["jerks"]["7"]["pj"]
+    assert numbers["seam_share"] == shipped["physical"]["share"]
+    assert "transition_fid" not in numbers
     assert "transition_fid" not in transitions.of_method(trial(how, crops=False), Maker(), 0)
     other = transitions.of_real(trial(replace(HOW, intervals=6), crops=False), 0)  # of 10 windows nothing was measured
     assert "pj" not in other
@@ -214,15 +214,15 @@ def test_shipped_numbers_are_those_of_their_own_windows(tmp_path: Path) -> None:
     """Written, read back, and computed once more by hand on the same windows."""
     moving = [features(place(k), 80) + 0.01 * np.random.default_rng(k).standard_normal((80, 263)) for k in range(9)]
     crops = real_seams.SeamCrops.of(moving, 60, None)
-    found = real_seams.measure_shipped(crops, source="made up")
-    (tmp_path / "r.json").write_text(json.dumps(found))
-    kept = real_seams.load_shipped(tmp_path / "r.json")
-    assert kept is not None
-    assert kept.mean_jerk == pytest.approx(crops.mean_jerk)
-    assert set(kept.jerks) == {7}
+    numbers = real_seams.measure_shipped(crops, source="made up")
+    (tmp_path / "r.json").write_text(json.dumps(numbers))
+    copy = real_seams.load_shipped(tmp_path / "r.json")
+    assert copy is not None
+    assert copy.mean_jerk == pytest.approx(crops.mean_jerk)
+    assert set(copy.jerks) == {7}
     draws = [crops.again(7, seed=(0, 3, r)).positions for r in range(real_seams.REPEATS)]
     peaks = [np.abs(np.diff(p, n=3, axis=1)).sum(-1).max(-1).mean(0).max() for p in draws]
-    assert kept.jerks[7]["pj"] == pytest.approx(np.mean(peaks), abs=1e-6)
+    assert copy.jerks[7]["pj"] == pytest.approx(np.mean(peaks), abs=1e-6)
 
 
 @pytest.mark.parametrize("change", ["[]", '{"format": 2}', "not json", '{"format": 1, "physical": {"share": "x"}}'])
@@ -265,11 +265,11 @@ def test_ways_give_the_visible_frames(name: str) -> None:
     prior, how = tiny.prior(), replace(HOW, steps=3)
     (method,) = methods(prior, how, [name]).values()
     prompts, frames = ["a person walks", "a person jumps", "a person waves"], [60, 71, 64]
-    made = method(prompts, frames, 5)
-    assert made.features.shape == (195, 263)
-    assert made.positions.shape == (195, 22, 3)
-    assert np.isfinite(made.positions).all()
-    assert np.array_equal(made.positions, method(prompts, frames, 5).positions)
+    motion = method(prompts, frames, 5)
+    assert motion.features.shape == (195, 263)
+    assert motion.positions.shape == (195, 22, 3)
+    assert np.isfinite(motion.positions).all()
+    assert np.array_equal(motion.positions, method(prompts, frames, 5).positions)
 
 
 def test_concatenation_is_decoded_once() -> None:
@@ -278,11 +278,11 @@ def test_concatenation_is_decoded_once() -> None:
 
     prior = tiny.prior()
     (method,) = methods(prior, replace(HOW, steps=3), ["concatenation"]).values()
-    made = method(["a person walks", "a person jumps"], [60, 64], 5)
+    motion = method(["a person walks", "a person jumps"], [60, 64], 5)
     alone = sample_features(prior, ["a person walks", "a person jumps"], [60, 64], seeds=[5, 6], steps=3)
-    assert made.features == pytest.approx(np.concatenate(alone), abs=1e-6)
-    step = np.linalg.norm(made.positions[60, 0, [0, 2]] - made.positions[59, 0, [0, 2]])
-    assert step == pytest.approx(np.linalg.norm(made.features[59, 1:3]), abs=1e-5)
+    assert motion.features == pytest.approx(np.concatenate(alone), abs=1e-6)
+    step = np.linalg.norm(motion.positions[60, 0, [0, 2]] - motion.positions[59, 0, [0, 2]])
+    assert step == pytest.approx(np.linalg.norm(motion.features[59, 1:3]), abs=1e-5)
 
 
 def test_ways_by_name() -> None:
@@ -301,19 +301,19 @@ def test_ways_by_name() -> None:
 
 
 def test_the_command_asks_for_what_was_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys) -> None:
-    asked = {}
+    calls = {}
 
     def fake(run: Run, **named) -> report.Report:
-        asked.update(named, command=run.command)
+        calls.update(named, command=run.command)
         return report.Report("transitions", "Long", run.command, {}, transitions.COLUMNS, ())
 
     monkeypatch.setattr(transitions, "run", fake)
     words = ["--methods", "ours,paper", "--intervals", "16", "--steps", "12", "--split", "test", "--out", str(tmp_path)]
     assert main(["evaluate", "transitions", *words, "--data", "/home/me/set"]) == 0
-    assert asked["names"] == ("ours", "paper")
-    assert asked["how"] == Transitions(intervals=16, steps=12)
-    assert asked["selection"].splits == ("test",)
-    assert asked["command"] == (
+    assert calls["names"] == ("ours", "paper")
+    assert calls["how"] == Transitions(intervals=16, steps=12)
+    assert calls["selection"].splits == ("test",)
+    assert calls["command"] == (
         "motionloom evaluate transitions --weights default --data SET --methods ours,paper --intervals 16 --steps 12 "
         "--split test"
     )
@@ -324,18 +324,18 @@ def test_the_command_asks_for_what_was_said(monkeypatch: pytest.MonkeyPatch, tmp
 def test_the_suite_runs_the_same_measurement(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from motionloom_lab.suites.registry import Job, Tools
 
-    asked = {}
+    calls = {}
 
     def fake(run: Run, **named) -> report.Report:
-        asked.update(named, command=run.command)
+        calls.update(named, command=run.command)
         return report.Report("transitions", "Long", run.command, {}, transitions.COLUMNS, ())
 
     monkeypatch.setattr(transitions, "run", fake)
     (suite,) = chosen(["transitions"])
     tools = Tools(*[lambda *_: None] * 4)  # type: ignore[list-item]
     suite.run(Job("default", tools, data=tmp_path, quick=True), suite.settings(True))
-    assert asked["how"] == quick_transitions(Transitions())
-    assert asked["command"] == "motionloom evaluate all --only transitions --weights default --data SET --quick"
+    assert calls["how"] == quick_transitions(Transitions())
+    assert calls["command"] == "motionloom evaluate all --only transitions --weights default --data SET --quick"
 
 
 def test_a_skeleton_of_the_world_is_the_bodys() -> None:

@@ -37,23 +37,23 @@ CLIPS = [
 
 def test_examples_others_and_the_other_side_are_counted_apart() -> None:
     check = BY_NAME["raise the left arm"]
-    found = trial.tried([check], {check.name: Examples(r"raises the left", like="unnamed", sided=True)}, CLIPS)[
+    tally = trial.tried([check], {check.name: Examples(r"raises the left", like="unnamed", sided=True)}, CLIPS)[
         check.name
     ]
-    assert found.shown == (2, 2)  # the left arm, and the right one mirrored
-    assert found.opposite == (0, 2)
-    assert found.others == (0, 4)
-    assert not found.doubts()
+    assert tally.shown == (2, 2)  # the left arm, and the right one mirrored
+    assert tally.opposite == (0, 2)
+    assert tally.others == (0, 4)
+    assert not tally.doubts()
 
 
 def test_a_check_that_lets_everybody_pass_is_doubted() -> None:
     check = BY_NAME["sit down from standing"]
-    found = trial.tried([check], {check.name: Examples(r"walks", like="up|stand")}, CLIPS)[check.name]
-    assert found.shown == (0, 2)
-    assert found.slipped == ["sitting@0"]
-    assert len(found.missed) == 2
-    assert "seat" in found.missed[0]
-    assert [doubt.split()[0] for doubt in found.doubts()] == ["misses", "50.0%"]
+    tally = trial.tried([check], {check.name: Examples(r"walks", like="up|stand")}, CLIPS)[check.name]
+    assert tally.shown == (0, 2)
+    assert tally.slipped == ["sitting@0"]
+    assert len(tally.missed) == 2
+    assert "seat" in tally.missed[0]
+    assert [doubt.split()[0] for doubt in tally.doubts()] == ["misses", "50.0%"]
     assert "no example" in trial.tried([check], {check.name: Examples()}, CLIPS)[check.name].doubts()
 
 
@@ -92,9 +92,9 @@ def test_every_check_has_a_trial_and_every_trial_a_check() -> None:
 
 def test_the_tables_have_a_row_per_check() -> None:
     checks = [BY_NAME["stand up"], BY_NAME["bow"]]
-    found = trial.tried(checks, {c.name: Examples("sits") for c in checks}, CLIPS)
-    assert [row[0] for row in trial.table(found)] == ["check", "stand up", "bow"]
-    assert trial.summary(found)["bow"]["shown"] == (0, 1)
+    tallies = trial.tried(checks, {c.name: Examples("sits") for c in checks}, CLIPS)
+    assert [row[0] for row in trial.table(tallies)] == ["check", "stand up", "bow"]
+    assert trial.summary(tallies)["bow"]["shown"] == (0, 1)
 
 
 # ---- real people -----------------------------------------------------------------------------------------------------
@@ -132,11 +132,11 @@ def people() -> dict[str, np.ndarray]:
     takes = {take.name: take for take in find_takes(pack)}
     missing = sorted(set(REAL.values()) - set(takes))
     assert not missing, missing
-    found = {}
+    clips = {}
     for name in REAL.values():
         features = next(clips_of(takes[name])).features.astype(float)
-        found[name] = trial.on_the_floor(humanml.decode_positions(features))
-    return found
+        clips[name] = trial.on_the_floor(humanml.decode_positions(features))
+    return clips
 
 
 @pytest.mark.parametrize("name", REAL)

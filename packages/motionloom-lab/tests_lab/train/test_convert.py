@@ -37,24 +37,24 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one sentence; nothing is written."""
     before = sorted(Path().rglob("*"))
     assert main(list(words)) == 2
-    said = capsys.readouterr()
-    assert (said.out, said.err.count("\n")) == ("", 1)
+    message = capsys.readouterr()
+    assert (message.out, message.err.count("\n")) == ("", 1)
     assert sorted(Path().rglob("*")) == before
-    return said.err
+    return message.err
 
 
 def test_an_old_prior_is_refused_and_the_command_it_names_makes_it_run(capsys: pytest.CaptureFixture[str]) -> None:
     new = save_prior(tiny.prior(), Path("tiny.safetensors"))
     old = without_graphs(new)
-    said = refused(capsys, "generate", "a person walks", "--weights", str(old), "--out", "a.bvh")
-    assert f"motionloom weights convert {old} NEW.safetensors" in said
+    message = refused(capsys, "generate", "a person walks", "--weights", str(old), "--out", "a.bvh")
+    assert f"motionloom weights convert {old} NEW.safetensors" in message
     assert main(["weights", "convert", str(old), "again.safetensors"]) == 0
     assert capsys.readouterr().out == "wrote again.safetensors\n"
     assert Path("again.safetensors").read_bytes() == new.read_bytes()
     assert weights_digest(old) == weights_digest(new)
     x, prior = np.ones((1, 9, 263), np.float32), Prior.load("again.safetensors")
-    wanted = Prior.load(new)
-    answers = [one.net(x, 3, one.net.bind(one.condition(["walks"]))) for one in (prior, wanted)]
+    target = Prior.load(new)
+    answers = [one.net(x, 3, one.net.bind(one.condition(["walks"]))) for one in (prior, target)]
     np.testing.assert_array_equal(*answers)
 
 
@@ -64,11 +64,11 @@ def test_predictors_and_blocks_are_converted_too() -> None:
     assert Predictor.load("p.safetensors").variant == "masked"
     block, prior = block_of("modulated")
     base = save_prior(prior, Path("base.safetensors"))  # type: ignore[arg-type]
-    made = block.save("block.safetensors")
-    old = without_graphs(made)
+    path = block.save("block.safetensors")
+    old = without_graphs(path)
     with pytest.raises(MotionloomError, match="has no graphs"):
         PairBlock.load(old, prior)  # type: ignore[arg-type]
-    assert convert(old, Path("b.safetensors"), prior=base).read_bytes() == made.read_bytes()
+    assert convert(old, Path("b.safetensors"), prior=base).read_bytes() == path.read_bytes()
     assert PairBlock.load("b.safetensors", prior).name == "dance"  # type: ignore[arg-type]
 
 
@@ -104,9 +104,9 @@ def test_a_damaged_prior_is_refused_in_one_sentence(capsys: pytest.CaptureFixtur
         (tensors, about | {"net": about["net"] | {"layers": 3}}),
         (tensors, about | {"net": 3}),
     )
-    for number, (changed, said) in enumerate(changes):
+    for number, (changed, message) in enumerate(changes):
         path = Path(f"bad{number}.safetensors")
-        save_tensors(changed, path, metadata={"motionloom": json.dumps(said)})
+        save_tensors(changed, path, metadata={"motionloom": json.dumps(message)})
         refused(capsys, "weights", "convert", str(path), "a.safetensors")
 
 
@@ -115,8 +115,8 @@ def test_without_the_training_package_one_sentence_names_it(
 ) -> None:
     old = without_graphs(save_prior(tiny.prior(), Path("tiny.safetensors")))
     monkeypatch.setitem(sys.modules, "motionloom_train.convert", None)
-    said = refused(capsys, "weights", "convert", str(old), "new.safetensors")
-    assert "this command needs motionloom_train, which is not installed" in said
+    message = refused(capsys, "weights", "convert", str(old), "new.safetensors")
+    assert "this command needs motionloom_train, which is not installed" in message
 
 
 def test_reading_and_writing_one_file_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

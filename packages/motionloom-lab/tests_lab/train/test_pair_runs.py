@@ -53,15 +53,15 @@ def test_the_file_holds_the_step_that_did_best_on_the_held_out_pair(start, tmp_p
     prior = Prior.load(start)
     good = PairBlock.load(place, prior)
     place, lines = trained(tmp_path, start, steps=12, rate=5.0, ema=0.0)  # going on, and all is lost
-    kept, last = PairBlock.load(place, prior), PairBlock.load(place.with_name("last.safetensors"), prior)
-    assert kept.notes == good.notes
+    best, last = PairBlock.load(place, prior), PairBlock.load(place.with_name("last.safetensors"), prior)
+    assert best.notes == good.notes
     assert last.notes["steps"] == 12
-    assert last.notes["held_out"]["loss"] > kept.notes["held_out"]["loss"]
+    assert last.notes["held_out"]["loss"] > best.notes["held_out"]["loss"]
     assert "best" not in lines[-1]
     assert "going on with another recipe" in " ".join(lines)
     held = held_out(objective(prior=prior), [pair("c", "val", turn=1.0)])
     assert held is not None
-    assert held.report(pair_module(kept, prior)).loss == pytest.approx(kept.notes["held_out"]["loss"], rel=0.02)
+    assert held.report(pair_module(best, prior)).loss == pytest.approx(best.notes["held_out"]["loss"], rel=0.02)
 
 
 def test_without_held_out_pairs_the_last_step_is_the_result(start, tmp_path):

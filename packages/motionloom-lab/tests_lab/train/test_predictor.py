@@ -44,12 +44,12 @@ def recipe(**changes) -> Recipe:
 
 
 def test_a_window_is_seen_from_where_its_last_observed_pose_stands_and_faces():
-    drawn = Windows(protocol().split("train"), protocol(), variant="masked").draw(1, 2, 64)
-    feet = drawn.features.reshape(64, -1, 22, 3)
-    for row, mask in enumerate(drawn.mask):
+    sample = Windows(protocol().split("train"), protocol(), variant="masked").draw(1, 2, 64)
+    feet = sample.features.reshape(64, -1, 22, 3)
+    for row, mask in enumerate(sample.mask):
         past = int(mask.all(-1).astype(int).cumprod(0).sum())
         last = feet[row, past - 1] if past < 20 else None
-        pose = drawn.pose[row].reshape(22, 3)
+        pose = sample.pose[row].reshape(22, 3)
         assert np.abs(pose[0, [0, 2]]).max() < 1e-5
         across = pose[1] - pose[2] + pose[16] - pose[17]
         assert abs(float(across[2])) < 1e-4 < float(across[0])  # the left side at +X: facing +Z
@@ -90,12 +90,12 @@ def test_a_smoothed_past_is_the_condition_and_the_recorded_one_is_predicted():
     data = protocol()
     plain = Windows(data.split("train"), data, variant="masked").draw(1, 1, 40)
     smooth = Windows(data.split("train"), data, variant="masked", smoothed=1.0).draw(1, 1, 40)
-    assert np.array_equal(plain.features, plain.shown)
+    assert np.array_equal(plain.features, plain.context)
     assert np.array_equal(plain.mask, smooth.mask)
-    rough, told = smooth.features[:, :2], smooth.shown[:, :2]
-    assert np.median(np.abs(rough - told).max((1, 2))) > 1e-6  # but for those of two frames, which are straight
-    assert np.abs(rough - told).max() < 0.15  # and nearly the same
-    assert np.allclose(smooth.features[:, 8:], smooth.shown[:, 8:], atol=1e-5)
+    rough, context = smooth.features[:, :2], smooth.context[:, :2]
+    assert np.median(np.abs(rough - context).max((1, 2))) > 1e-6  # but for those of two frames, which are straight
+    assert np.abs(rough - context).max() < 0.15  # and nearly the same
+    assert np.allclose(smooth.features[:, 8:], smooth.context[:, 8:], atol=1e-5)
 
 
 def test_a_straight_way_is_as_it_was_when_smoothed():
@@ -103,16 +103,16 @@ def test_a_straight_way_is_as_it_was_when_smoothed():
     windows = Windows(data.split("train"), data, variant="masked", smoothed=1.0)
     ramp = np.arange(20.0)[None, :, None, None] * np.array([0.1, 0.02, -0.3]) + np.zeros((3, 20, 22, 3))
     past = np.array([8, 5, 2])
-    kept = windows._smoothed(np.random.default_rng(0), ramp, past)
-    assert np.allclose(kept, ramp, atol=1e-9)
+    places = windows._smoothed(np.random.default_rng(0), ramp, past)
+    assert np.allclose(places, ramp, atol=1e-9)
 
 
 def test_published_windows_drop_the_way_and_are_seen_from_anywhere():
     published = protocol(H36M_LAYOUT)
-    drawn = Windows(published.split("train"), published, variant="published").draw(0, 0, 100)
-    assert drawn.features.shape == (100, 20, 48)
-    assert bool((drawn.mask.sum((1, 2)) == 8 * 16).all())
-    facing = np.arctan2(drawn.pose[:, 1], drawn.pose[:, 0])  # x and y of the right hip, +Z up
+    sample = Windows(published.split("train"), published, variant="published").draw(0, 0, 100)
+    assert sample.features.shape == (100, 20, 48)
+    assert bool((sample.mask.sum((1, 2)) == 8 * 16).all())
+    facing = np.arctan2(sample.pose[:, 1], sample.pose[:, 0])  # x and y of the right hip, +Z up
     assert len(np.unique((facing * 10).round())) > 20
 
 
@@ -131,8 +131,8 @@ def test_states_of_the_other_manner_are_standardised():
     data = protocol()
     windows = Windows(data.split("train"), data, variant="masked")
     predictor = new_predictor(data, Settings.parse(SMALL), windows, schedule="cosine", levels=1000)
-    drawn = windows.draw(9, 9, 2000)
-    state = predictor.to_state(drawn.features, drawn.pose)
+    sample = windows.draw(9, 9, 2000)
+    state = predictor.to_state(sample.features, sample.pose)
     moving = predictor.std > 1e-3
     assert (np.abs(state.mean(0)[moving]) < 0.15).all()
     assert (abs(state.std(0)[moving] - 1) < 0.15).all()

@@ -2,7 +2,7 @@
 
     python -m motionloom_train.average BEFORE.safetensors AFTER.safetensors OUT.safetensors [--share 0.5]
 
-What the file says of itself, the standardisation, the text encoder and the table of sentences are those of AFTER.
+The card of the file, the standardisation, the text encoder and the table of sentences are those of AFTER.
 """
 
 import argparse

@@ -73,7 +73,7 @@ class Captured:
         graph = self._graphs[shape]
         if graph is None:
             self.optimizer.zero_grad(set_to_none=True)
-            beside = next((made for made in self._graphs.values() if made), None)
+            beside = next(filter(None, self._graphs.values()), None)
             graph = self._graphs[shape] = Graph(work, beside=beside)
             generator.manual_seed(self.objective.number(seed, step))
         return graph.replay().clone()
@@ -98,13 +98,13 @@ class Graph:
             self._result = work()
 
     def replay(self) -> Tensor:
-        """Run the work; what it gave is overwritten by the next run."""
+        """Run the work; its result is overwritten by the next run."""
         self._graph.replay()
         return self._result
 
 
 def default_generator(device: torch.device | str) -> torch.Generator:
-    """The device's own source of random numbers, the only one that graphs take without being told."""
+    """The device's own source of random numbers, the only one that graphs take by themselves."""
     device = torch.device(device)
     if device.type != "cuda":
         return torch.default_generator

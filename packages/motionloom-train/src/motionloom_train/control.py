@@ -3,7 +3,7 @@
     noise <- noise * (1 - M);   x_t = signal * x_0 + noise_t * noise;   loss over all numbers of the denoised estimate
 
 The given numbers M of a state are thus signal * x_0, without noise. From a finished prior, either all its weights are
-trained on (``full``, as published) or a low-rank adapter whose input also says what is given (`weights.adapter`).
+trained on (``full``, as published) or a low-rank adapter whose input also shows what is given (`weights.adapter`).
 
 What is given is random, in the ways that users give it: a path or a hand in all frames, at a few keyframes, on
 stretches, from the beginning, around a gap; whole poses; half of the body. A joint's place is measured from the root,
@@ -113,42 +113,43 @@ def _anything(length: int, frames: int, rng: np.random.Generator) -> Flags:
     if kind < 0.4:
         return _trajectory(length, frames, rng)
     when = some_frames(length, frames, 0.5, rng)
-    given = _root(when, rng)
+    flags = _root(when, rng)
     for joint in rng.choice(np.arange(1, len(SMPL22)), size=int(rng.choice([1, 1, 2, 2, 3, 4, 8, 21])), replace=False):
         own = some_frames(length, frames, 0.5, rng) if rng.random() < 0.3 else when
-        given |= own[:, None] & mask(SMPL22.names[joint])
-    return given
+        flags |= own[:, None] & mask(SMPL22.names[joint])
+    return flags
 
 
 HELD_WINDOW, HELD_ROWS = 80, 48
 """Frames and number of the held-out windows that are reported on."""
 
 
-class Shown(nn.Module):
+class ControlledNet(nn.Module):
     """A network in training that binds its condition and takes what is given, if it can, in one call."""
 
     def __init__(self, net: PriorNet | AdapterNet) -> None:
         super().__init__()
         self.net = net
 
-    def forward(self, x: Tensor, level: Tensor, cond: Condition, given: Tensor, mask: Tensor) -> Tensor:
-        return self.net(x, level, show(self.net, self.net.bind(cond), given, mask))
+    def forward(self, x: Tensor, level: Tensor, cond: Condition, values: Tensor, mask: Tensor) -> Tensor:
+        return self.net(x, level, show(self.net, self.net.bind(cond), values, mask))
 
 
 class ControlledError(CleanError):
     """`CleanError` of states whose given numbers are free of noise; the masks of a step follow from (seed, step)."""
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
-        """See `Objective.loss`; ``net`` is a wrapped `Shown`."""
-        drawn = self.sample(seed, step, rows)
+        """See `Objective.loss`; ``net`` is a wrapped `ControlledNet`."""
+        sample = self.sample(seed, step, rows)
         if self.recipe.spacing == "early":  # most levels near pure noise
-            even = drawn.level.double() / self.schedule.steps
-            drawn = drawn._replace(level=(self.schedule.steps * (1 - (1 - even) ** 2)).round().long())
+            even = sample.level.double() / self.schedule.steps
+            sample = sample._replace(level=(self.schedule.steps * (1 - (1 - even) ** 2)).round().long())
         rng = np.random.default_rng((seed, step, 2))
-        masks = draw_masks(self.recipe.control, drawn.cond.lengths.cpu().numpy(), drawn.clean.shape[1], rng=rng)
+        clean, level, noise, cond = sample
+        masks = draw_masks(self.recipe.control, cond.lengths.cpu().numpy(), clean.shape[1], rng=rng)
         mask = torch.from_numpy(masks).to(self.device)
-        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise * ~mask)
-        return self.error(net(state, drawn.level, drawn.cond, drawn.clean, mask), drawn)
+        state = noised(self.schedule, clean, level, noise * ~mask)
+        return self.error(net(state, level, cond, clean, mask), sample)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +187,8 @@ def held_out(data: Path | str, prior: Prior, recipe: Recipe) -> Held | None:
         clip = clips[number]
         first = int(rng.integers(len(clip.features) - HELD_WINDOW + 1))
         windows.append(torch.from_numpy(clip.features[first : first + HELD_WINDOW]).float())
-        said = (n.texts[0] for n in clip.notes if n.kind == "human" and n.first <= first and n.texts)
-        prompts.append(next(said, ""))
+        captions = (n.texts[0] for n in clip.notes if n.kind == "human" and n.first <= first and n.texts)
+        prompts.append(next(captions, ""))
     clean = (torch.stack(windows) - tensor(prior.mean)) / tensor(prior.std)
     masks = draw_masks(recipe.control, np.full(HELD_ROWS, HELD_WINDOW), HELD_WINDOW, rng=rng)
     mask = torch.from_numpy(masks)
@@ -219,14 +220,14 @@ def train_control(run: Training, data: Path | str, text: TextEncoder) -> Path:
 
     def export(average: Average, step: int) -> None:
         weights = {k: v.cpu() for k, v in average.weights.items()}
-        made = _full(recipe, prior, motions, weights, step) if recipe.full else None
-        if made:
-            save_prior(made, run.place)
+        whole = _full(recipe, prior, motions, weights, step) if recipe.full else None
+        if whole:
+            save_prior(whole, run.place)
         else:
             _adapter(recipe, prior, motions, weights, step).save(run.place)
         if held:
             base = prior_module(prior)
-            now = prior_module(made) if made else adapted(base, Adapter.load(run.place, prior))
+            now = prior_module(whole) if whole else adapted(base, Adapter.load(run.place, prior))
             run.say(f"step {step}: {_report(held, now, base)}")
 
     count = sum(p.numel() for p in net.parameters())
@@ -236,7 +237,7 @@ def train_control(run: Training, data: Path | str, text: TextEncoder) -> Path:
 
 def _wrap(net: nn.Module) -> nn.Module:
     assert isinstance(net, PriorNet | AdapterNet)
-    return Shown(net)
+    return ControlledNet(net)
 
 
 def _trained(recipe: Recipe, prior: Prior, device: str) -> PriorNet | AdapterNet:
@@ -256,9 +257,9 @@ def _trained(recipe: Recipe, prior: Prior, device: str) -> PriorNet | AdapterNet
 
 
 def _report(held: Held, net: nn.Module, base: nn.Module) -> str:
-    (given, free), (given0, free0) = held.errors(net), held.errors(base)
+    (known, free), (known0, free0) = held.errors(net), held.errors(base)
     return (
-        f"held-out squared error, given numbers {given:.4f} (base network {given0:.4f}), "
+        f"held-out squared error, given numbers {known:.4f} (base network {known0:.4f}), "
         f"free numbers {free:.4f} (base network {free0:.4f})"
     )
 

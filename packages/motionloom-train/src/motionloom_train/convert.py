@@ -53,12 +53,12 @@ def _graphs(
     about = kind.describe(path, head)
     with kind.parsing(path):
         if kind is PREDICTORS:
-            made = {"predictor": predictor_graph(PredictorConfig.parse(about["net"]))}
+            graphs = {"predictor": predictor_graph(PredictorConfig.parse(about["net"]))}
         elif kind is PAIRS:
             return {"pair": pair_graph(PairConfig.parse(about["config"]), _prior_config(prior))}
         else:
-            made = dict(prior_graphs(NetConfig.parse(about["net"])))
-    for graph in made.values():
+            graphs = dict(prior_graphs(NetConfig.parse(about["net"])))
+    for graph in graphs.values():
         check_graph(graph, weights)
     if kind is PRIORS and about["text"] == "minilm":
         packed = {key[len(TEXT) :]: value for key, value in weights.items() if key.startswith(TEXT)}
@@ -66,8 +66,8 @@ def _graphs(
             sizes = sizes_of(unpacked(packed))
         except (KeyError, ValueError, IndexError) as error:
             raise MotionloomError(f"the text encoder in {path} is damaged ({error}); fetch the weights again") from None
-        made["text"] = text_graph(sizes["width"], sizes["hidden"], sizes["layers"])
-    return made
+        graphs["text"] = text_graph(sizes["width"], sizes["hidden"], sizes["layers"])
+    return graphs
 
 
 def _prior_config(prior: Path | None) -> NetConfig:

@@ -30,7 +30,7 @@ class Crops(NamedTuple):
     lengths: np.ndarray
     """(pairs,) valid frames."""
     texts: np.ndarray
-    """(pairs,) numbers of `Duets.texts`; 0 where nobody said anything."""
+    """(pairs,) numbers of `Duets.texts`; 0 where there is no caption."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Duets:
         return _Encoded(features.float(), ways.float(), tuple(known[t] for t in pair.captions if t in known) or (0,))
 
     def draw(self, rng: np.random.Generator, window: int, rows: int) -> Crops:
-        """Windows anywhere in recordings drawn by the root of their length; half of them with the people exchanged."""
+        """Windows anywhere in recordings chosen by the root of their length; half of them with the people exchanged."""
         which = rng.choice(len(self.encoded), rows, p=np.sqrt(self.lengths) / np.sqrt(self.lengths).sum())
         starts = rng.integers(0, np.maximum(self.lengths[which] - window, 0) + 1)
         crops = self.crops(which, starts, window, rng=rng)

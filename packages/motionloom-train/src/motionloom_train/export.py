@@ -54,17 +54,17 @@ class PriorGraph(nn.Module):
         super().__init__()
         self.net = net
 
-    def forward(self, *given: Tensor) -> Tensor:
+    def forward(self, *tensors: Tensor) -> Tensor:
         """See `motionloom.runtime.prior.PriorSession` for the arguments, which are `inputs` in order."""
-        return self.net.end(self.net.through(*self.begin(self.net, *given)))
+        return self.net.end(self.net.through(*self.begin(self.net, *tensors)))
 
     @staticmethod
-    def begin(net: PriorNet, *given: Tensor) -> tuple[Inner, Bound]:
+    def begin(net: PriorNet, *tensors: Tensor) -> tuple[Inner, Bound]:
         """What the first block sees, and what the blocks attend to, of the eight `inputs`."""
-        state, shown, level, text, keys, values, words, valid = given
+        state, control, level, text, keys, values, words, valid = tensors
         nothing = text.new_zeros(0)
         bound = Bound(text, keys, values, words[:, None, None], nothing, nothing)
-        return net.begin(net.embed(state) + shown, level, text, token_mask(net, valid)), bound
+        return net.begin(net.embed(state) + control, level, text, token_mask(net, valid)), bound
 
     def example(self) -> tuple[Tensor, ...]:
         """Arguments of the right kinds; every axis that may vary has a length of its own."""
@@ -85,7 +85,7 @@ class PriorGraph(nn.Module):
 
 
 class BindGraph(nn.Module):
-    """What a prior's network makes of a condition alone."""
+    """What a prior's network computes from a condition alone."""
 
     def __init__(self, net: PriorNet) -> None:
         super().__init__()
@@ -130,9 +130,9 @@ class PairGraph(nn.Module):
         self.register_buffer("mean", mean)
         self.register_buffer("std", std)
 
-    def forward(self, *given: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, *tensors: Tensor) -> tuple[Tensor, Tensor]:
         """See `motionloom.runtime.pair.PairSession` for the arguments, which are `inputs` in order."""
-        *one, frames, places, signal = given
+        *one, frames, places, signal = tensors
         inner, bound = PriorGraph.begin(self.net, *one)
         inner, place = self.pair[0].spoken(inner, bound, places, signal, frames, frames.shape[1])
         return self.net.end(inner), place
@@ -209,7 +209,7 @@ def graph_bytes(module: Exported, names: Callable[[str], str] = str) -> bytes:
     module = module.eval().requires_grad_(False)
     generator = torch.Generator().manual_seed(0)
     for value in module.state_dict().values():
-        value.normal_(generator=generator)  # the exporter makes equal weights one
+        value.normal_(generator=generator)  # the exporter merges equal weights
     axes = {**module.inputs, **module.outputs}
     with TemporaryDirectory() as folder, torch.no_grad(), _symbolics(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what tracing may get wrong: that graphs equal modules is tested
@@ -335,7 +335,7 @@ def _linear(g: Any, x: Any, weight: Any, bias: Any) -> Any:
         return y
     shape = g.op("Concat", g.op("Shape", x, end_i=-1), _whole(g, [outer]), axis_i=0)
     answer = g.op("Reshape", y, shape)
-    if rank is not None:  # what comes behind wants to know how many axes there are
+    if rank is not None:  # the next operations need the number of axes
         answer.setType(x.type().with_sizes([*[None] * (rank - 1), outer]))
     return answer
 

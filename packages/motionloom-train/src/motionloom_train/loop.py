@@ -86,7 +86,7 @@ class Training:
         return self.folder / f"{self.recipe.name}.safetensors"
 
     def progress(self, line: str) -> None:
-        """Say a line, in the first process alone."""
+        """Report a line, in the first process alone."""
         if self.world.rank == 0:
             self.say(line)
 
@@ -104,7 +104,7 @@ class Training:
         Args:
             objective: what is minimised.
             export: writes the weights of an average at a step, at every save.
-            about: what is trained, on what: said first.
+            about: what is trained, on what: reported first.
             wrap, capture: as of `train`.
         """
         self.say(about)
@@ -128,7 +128,7 @@ class Training:
 
 
 def compiled(recipe: Recipe, dynamic: bool | None = None) -> Callable[[nn.Module], nn.Module]:
-    """What compiles a network where the recipe says so; ``dynamic``: for shapes that change from step to step."""
+    """What compiles a network where the recipe has `compile`; ``dynamic``: for shapes that change from step to step."""
     return lambda net: torch.compile(net, dynamic=dynamic) if recipe.compile else net  # type: ignore[return-value]
 
 
@@ -183,16 +183,16 @@ def save_state(
 
 
 def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
-    """Of all that a state file says, so that a byte that turned over is noticed."""
-    found = hashlib.blake2b(digest_size=32)
+    """Of the whole content of a state file, so that a single wrong bit is noticed."""
+    digest = hashlib.blake2b(digest_size=32)
     for key in ("step", "recipe"):
-        found.update(f"{key}={metadata[key]};".encode())
+        digest.update(f"{key}={metadata[key]};".encode())
     for name in sorted(tensors):
         value = tensors[name].contiguous()
-        found.update(f"{name} {value.dtype} {tuple(value.shape)};".encode())
+        digest.update(f"{name} {value.dtype} {tuple(value.shape)};".encode())
         if value.numel():  # an empty one has no bytes, and cannot be seen as such
-            found.update(value.reshape(-1).view(torch.uint8).numpy().data)
-    return found.hexdigest()
+            digest.update(value.reshape(-1).view(torch.uint8).numpy().data)
+    return digest.hexdigest()
 
 
 def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer) -> int:
@@ -209,9 +209,9 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
     elif metadata["checksum"] != _checksum(tensors, metadata):
         raise MotionloomError(f"{path} is damaged: its checksum is another; train into another folder")
     try:
-        said = metadata["step"]
-        if not (said.isascii() and said.isdigit() and len(said) <= 10):
-            raise ValueError(f"its step is {said[:20]!r}")
+        step = metadata["step"]
+        if not (step.isascii() and step.isdigit() and len(step) <= 10):
+            raise ValueError(f"its step is {step[:20]!r}")
         _check_state(tensors, net, average, optimizer)
         net.load_state_dict(_part(tensors, "net."))
         for key, value in average.weights.items():
@@ -221,7 +221,7 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
             number, _, name = key.partition(".")
             state.setdefault(int(number), {})[name] = value
         optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
-        return int(said)
+        return int(step)
     except (KeyError, RuntimeError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise MotionloomError(f"{path} does not belong to this recipe ({reason}); train into another folder") from None
@@ -235,20 +235,20 @@ def _check_state(
     tensors: Mapping[str, Tensor], net: nn.Module, average: Average, optimizer: torch.optim.Optimizer
 ) -> None:
     """Raise ValueError unless every tensor is finite, and has the shape and kind of what it is to fill."""
-    wanted = {f"net.{k}": v for k, v in net.state_dict().items()}
-    wanted |= {f"average.{k}": v for k, v in average.weights.items()}
+    targets = {f"net.{k}": v for k, v in net.state_dict().items()}
+    targets |= {f"average.{k}": v for k, v in average.weights.items()}
     places = [p for group in optimizer.param_groups for p in group["params"]]
     moments = {"exp_avg": places, "exp_avg_sq": places, "step": [torch.tensor(0.0)] * len(places)}
     for key in _part(tensors, "optimizer."):
         number, _, name = key.partition(".")
         if not (number.isascii() and number.isdigit() and int(number) < len(places) and name in moments):
             raise ValueError(f"the optimiser has no {key[:40]}")
-        wanted |= {f"optimizer.{number}.{each}": values[int(number)] for each, values in moments.items()}
-    lacking = sorted(wanted.keys() - tensors.keys()) or sorted(tensors.keys() - wanted.keys())
+        targets |= {f"optimizer.{number}.{each}": values[int(number)] for each, values in moments.items()}
+    lacking = sorted(targets.keys() - tensors.keys()) or sorted(tensors.keys() - targets.keys())
     if lacking:
-        raise ValueError(f"{lacking[0][:80]} is {'missing' if lacking[0] in wanted else 'not needed'}")
+        raise ValueError(f"{lacking[0][:80]} is {'missing' if lacking[0] in targets else 'not needed'}")
     for key, value in tensors.items():
-        if value.shape != wanted[key].shape or value.dtype != wanted[key].dtype:
+        if value.shape != targets[key].shape or value.dtype != targets[key].dtype:
             raise ValueError(f"{key} is {value.dtype} of the shape {tuple(value.shape)}")
         if value.is_floating_point() and not bool(value.isfinite().all()):
             raise ValueError(f"{key} has numbers that are not finite")
@@ -288,33 +288,33 @@ def train(
     (`motionloom_train.captured`), in one process on a CUDA device, of an objective that allows it. ``stop``: end early
     after so many steps.
     ``say`` is called with the number format if the recipe leaves that open, and after the first steps with how long
-    the run will take. A run that goes on multiplies in what it did, unless the recipe says otherwise.
+    the run will take. A run that goes on multiplies in what it did, unless the recipe changes that.
     """
     world, folder = world or World(), Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     net = objective.net.to(world.device)
     average = Average(net, recipe.ema)
     optimizer = make_optimizer(net, recipe)
-    done = load_state(folder / STATE, net, average, optimizer) if (folder / STATE).is_file() else 0
+    start = load_state(folder / STATE, net, average, optimizer) if (folder / STATE).is_file() else 0
     recipe = replace(recipe, amp=_precision(recipe, folder, net, world, say=say))
-    called = wrap(net)
+    model = wrap(net)
     if world.size > 1:
         places = [world.device] if world.device.startswith("cuda") else None
-        called = nn.parallel.DistributedDataParallel(called, device_ids=places)
+        model = nn.parallel.DistributedDataParallel(model, device_ids=places)
     net.train()
     last = min(recipe.steps, stop or recipe.steps)
-    if done >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
-        on_save(average, done)
-    pace = Pace(done, last, say)
+    if start >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
+        on_save(average, start)
+    pace = Pace(start, last, say)
     losses: list[Tensor] = []
     seed, context = recipe.seed * 1_000_003 + world.rank, _context(recipe, world)
-    whole = Captured(objective, called, optimizer, clip=recipe.clip, context=context) if capture else None  # type: ignore[arg-type]
+    whole = Captured(objective, model, optimizer, clip=recipe.clip, context=context) if capture else None  # type: ignore[arg-type]
     began = time.perf_counter()
-    for step in range(done, last):
+    for step in range(start, last):
         if whole:
             losses.append(whole.step(seed, step, recipe.batch, rate_at(recipe, step)))
         else:
-            losses.append(_step(objective, called, optimizer, recipe, seed=seed, step=step, context=context))
+            losses.append(_step(objective, model, optimizer, recipe, seed=seed, step=step, context=context))
         average.update(net, step)
         saves = (step + 1) % recipe.save_every == 0 or step + 1 == last
         if len(losses) < (BEHIND if world.device.startswith("cuda") else 1) and not saves:
@@ -352,11 +352,11 @@ def _finite(losses: list[Tensor], step: int) -> list[float]:
 
 def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, say: Say) -> str:
     """What the run multiplies in, ``bf16`` or ``float32``, the same in all processes."""
-    said = recipe.amp
-    if said == "auto" and (folder / STATE).is_file():
-        said = str(plain_json(read_tensors(folder / STATE)[1]["recipe"])["amp"])
-    if said != "auto":
-        return "bf16" if said == "bf16" else "float32"
+    amp = recipe.amp
+    if amp == "auto" and (folder / STATE).is_file():
+        amp = str(plain_json(read_tensors(folder / STATE)[1]["recipe"])["amp"])
+    if amp != "auto":
+        return "bf16" if amp == "bf16" else "float32"
     chosen = "float32"
     if world.rank == 0:
         chosen, why = choose(net, world.device)
@@ -369,24 +369,24 @@ def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, sa
 
 
 class Pace:
-    """Says once, after the first steps, how long the rest will take."""
+    """Reports once, after the first steps, how long the rest will take."""
 
     STEPS, SECONDS = 10, 20.0
-    """It is said after so many steps, or earlier once these seconds have gone by."""
+    """It is reported after so many steps, or earlier once these seconds have gone by."""
 
-    def __init__(self, done: int, last: int, say: Say) -> None:
-        self.left, self.say, self.told = last - done, say, False
-        self.seen: list[float] = []
+    def __init__(self, start: int, last: int, say: Say) -> None:
+        self.left, self.say, self.reported = last - start, say, False
+        self.times: list[float] = []
 
     def __call__(self, seconds: float) -> None:
         """Take in how long a step took. The first one counts only while there is no other: much is set up in it."""
         self.left -= 1
-        if self.told:
+        if self.reported:
             return
-        self.seen.append(seconds)
-        if len(self.seen) == self.STEPS or sum(self.seen) >= self.SECONDS:
-            self.told = True
-            usual = self.seen[1:] or self.seen
+        self.times.append(seconds)
+        if len(self.times) == self.STEPS or sum(self.times) >= self.SECONDS:
+            self.reported = True
+            usual = self.times[1:] or self.times
             mean = sum(usual) / len(usual)
             self.say(f"{self.left:,} more steps of about {mean:.2g} s: {_span(mean * self.left)}")
 

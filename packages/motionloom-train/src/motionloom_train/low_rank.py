@@ -27,7 +27,7 @@ class Controlled(NamedTuple):
     """The condition of an `AdaptedNet`: what the network is bound to, and what is given."""
 
     bound: Bound
-    given: Tensor
+    values: Tensor
     """(rows, frames, features) standardised; what is not given may be anything finite."""
     mask: Tensor
     """(rows, frames, features) bool: which numbers are given."""
@@ -65,43 +65,43 @@ class AdaptedNet(nn.Module):
     def forward(self, x: Tensor, level: int | Tensor, bound: Bound | Controlled) -> Tensor:
         """(rows, frames, features) standardised at ``level`` to the denoised estimate."""
         if isinstance(bound, Controlled):
-            plain, shown = bound.bound, [torch.where(bound.mask, bound.given.to(x), 0.0), bound.mask.to(x)]
+            plain, extra = bound.bound, [torch.where(bound.mask, bound.values.to(x), 0.0), bound.mask.to(x)]
         else:
-            plain, shown = bound, [torch.zeros_like(x)] * 2
-        return self.net(torch.cat([x, *shown], dim=-1) if self.sees_given else x, level, plain)
+            plain, extra = bound, [torch.zeros_like(x)] * 2
+        return self.net(torch.cat([x, *extra], dim=-1) if self.sees_given else x, level, plain)
 
 
-def show(net: nn.Module, bound: Bound, given: Tensor, mask: Tensor) -> Bound | Controlled:
+def show(net: nn.Module, bound: Bound, values: Tensor, mask: Tensor) -> Bound | Controlled:
     """The condition that shows a network what is given, if it takes one; see `Controlled`."""
-    return Controlled(bound, given, mask) if isinstance(net, AdaptedNet | AdapterNet) else bound
+    return Controlled(bound, values, mask) if isinstance(net, AdaptedNet | AdapterNet) else bound
 
 
 def adapted(net: PriorNet, adapter: Adapter) -> AdaptedNet:
     """A copy of the network with the adapter merged into its weights: as quick as the network itself."""
-    made = copy.deepcopy(net).eval().requires_grad_(False)
-    for name, layer in linears(made, taught=adapter.taught).items():
+    result = copy.deepcopy(net).eval().requires_grad_(False)
+    for name, layer in linears(result, taught=adapter.taught).items():
         down, up = (torch.from_numpy(adapter.tensors[f"{name}.{part}"]).to(layer.weight) for part in ("down", "up"))
         layer.weight = nn.Parameter(layer.weight + up @ down, requires_grad=False)
     if adapter.sees_given:
         down, up = (
-            torch.from_numpy(adapter.tensors[f"{GIVEN}.{part}"]).to(made.embed.weight) for part in ("down", "up")
+            torch.from_numpy(adapter.tensors[f"{GIVEN}.{part}"]).to(result.embed.weight) for part in ("down", "up")
         )
-        wide = beside(made.embed.weight, up @ down, net.config)
-        made.embed = nn.Linear(wide.shape[1], wide.shape[0], device="meta")
-        made.embed.weight = nn.Parameter(wide, requires_grad=False)
-        made.embed.bias = nn.Parameter(net.embed.bias.detach().clone(), requires_grad=False)
-    return AdaptedNet(made, adapter.sees_given)
+        wide = beside(result.embed.weight, up @ down, net.config)
+        result.embed = nn.Linear(wide.shape[1], wide.shape[0], device="meta")
+        result.embed.weight = nn.Parameter(wide, requires_grad=False)
+        result.embed.bias = nn.Parameter(net.embed.bias.detach().clone(), requires_grad=False)
+    return AdaptedNet(result, adapter.sees_given)
 
 
-def beside(embed: Tensor, given: Tensor, config: NetConfig) -> Tensor:
+def beside(embed: Tensor, control: Tensor, config: NetConfig) -> Tensor:
     """Weights that read frames of [state, given, mask, flags], from those of state and flags and those of the rest."""
     state = embed.unflatten(1, (config.patch, -1))
-    shown = given.unflatten(1, (config.patch, -1))
-    return torch.cat([state[..., : config.features], shown, state[..., config.features :]], dim=-1).flatten(1)
+    extra = control.unflatten(1, (config.patch, -1))
+    return torch.cat([state[..., : config.features], extra, state[..., config.features :]], dim=-1).flatten(1)
 
 
 class LowRank(nn.Module):
-    """A frozen layer and its change, kept apart: in training no gradient of the layer's own weight is made."""
+    """A frozen layer and its change, kept apart: in training no gradient of the layer's own weight is computed."""
 
     def __init__(self, layer: nn.Linear, down: nn.Parameter, up: nn.Parameter) -> None:
         super().__init__()
@@ -120,11 +120,11 @@ class GivenEmbed(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         count = self.config.features
-        state, given, flags = x.unflatten(-1, (self.config.patch, -1)).split(
+        state, known, flags = x.unflatten(-1, (self.config.patch, -1)).split(
             [count, 2 * count, x.shape[-1] // self.config.patch - 3 * count], dim=-1
         )
-        seen = F.linear(F.linear(given.flatten(-2), QUICK * self.down), QUICK * self.up)
-        return self.embed(torch.cat([state, flags], dim=-1).flatten(-2)) + seen
+        hint = F.linear(F.linear(known.flatten(-2), QUICK * self.down), QUICK * self.up)
+        return self.embed(torch.cat([state, flags], dim=-1).flatten(-2)) + hint
 
 
 class AdapterNet(nn.Module):

@@ -38,8 +38,8 @@ def pair_module(block: PairBlock, prior: Prior) -> PairNet:
     talk = Talk(block.config, prior.net.config)
     fill(talk, block.tensors, "the block")
     mean, std = torch.from_numpy(prior.mean), torch.from_numpy(prior.std)
-    made = PairNet(prior_module(prior), talk, prior.schedule, mean=mean, std=std)
-    return made.eval().requires_grad_(False)
+    net = PairNet(prior_module(prior), talk, prior.schedule, mean=mean, std=std)
+    return net.eval().requires_grad_(False)
 
 
 def predictor_module(predictor: Predictor) -> TransLinear:
@@ -72,12 +72,12 @@ def arrays(net: nn.Module) -> dict[str, np.ndarray]:
 
 
 def shapes(net: nn.Module) -> dict[str, tuple[int, ...]]:
-    """Names and shapes of what a network wants; it may be on the device ``meta`` and hold no memory."""
+    """Names and shapes of a network's weights; it may be on the device ``meta`` and hold no memory."""
     return {key: tuple(value.shape) for key, value in net.state_dict().items()}
 
 
 def fill(net: nn.Module, weights: Mapping[str, "np.ndarray | Tensor"], what: str) -> None:
-    """Put weights into a network after `check`; one on the device ``meta`` takes the tensors themselves.
+    """Fill a network with weights after `check`; one on the device ``meta`` takes the tensors themselves.
 
     what: how the sentence of an error calls the weights, such as a path.
     """

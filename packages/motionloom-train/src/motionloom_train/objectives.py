@@ -39,7 +39,7 @@ class Objective(Protocol):
         ...
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
-        """The loss of one step, drawn from ``(seed, step)`` alone; ``net`` may be a wrapped `self.net`."""
+        """The loss of one step, which follows from ``(seed, step)`` alone; ``net`` may be a wrapped `self.net`."""
         ...
 
 
@@ -59,9 +59,9 @@ class WordBank:
         tokens, pooled = [], []
         progress(f"encoding {len(texts)} sentences")
         for first in range(0, len(texts), 256):
-            said = encoder.encode(texts[first : first + 256])
-            pooled.append(said.pooled)
-            for row, mask in zip(said.tokens, said.mask, strict=True):
+            batch = encoder.encode(texts[first : first + 256])
+            pooled.append(batch.pooled)
+            for row, mask in zip(batch.tokens, batch.mask, strict=True):
                 count = min(int(mask.sum()), room)
                 tokens.append(row[:count].astype(np.float16))
                 starts.append(starts[-1] + count)
@@ -74,16 +74,16 @@ class WordBank:
         device = self.tokens.device
         texts, lengths = texts.to(device), lengths.to(device)
         first, counts = self.starts[texts], self.starts[texts + 1] - self.starts[texts]
-        # a GPU computes in few shapes: its kernels and graphs are made for each
+        # a GPU computes in few shapes: it has kernels and graphs for each
         most = int(counts.max()) if device.type == "cpu" else self.most
         place = torch.arange(most, device=device)
         words = place < counts[:, None]
-        taken = (first[:, None] + place).clamp(max=len(self.tokens) - 1)
-        tokens = self.tokens[taken].float() * words[..., None]
+        indices = (first[:, None] + place).clamp(max=len(self.tokens) - 1)
+        tokens = self.tokens[indices].float() * words[..., None]
         return condition(self.pooled[texts], tokens=tokens, words=words, lengths=lengths)
 
 
-class Drawn(NamedTuple):
+class Sample(NamedTuple):
     """One step's samples."""
 
     clean: Tensor
@@ -129,30 +129,30 @@ class CleanError:
 
     def shown_loss(self, net: nn.Module, shape: int, picked: Tensor, generator: torch.Generator) -> Tensor:
         """See `motionloom_train.captured.Capturable`."""
-        drawn = self._noised(shape, picked, generator)
-        at = drawn.level[:, None, None]
-        state = self._signal[at] * drawn.clean + self._spread[at] * drawn.noise
-        return self.error(net(state, drawn.level, drawn.cond), drawn)
+        sample = self._noisy(shape, picked, generator)
+        at = sample.level[:, None, None]
+        state = self._signal[at] * sample.clean + self._spread[at] * sample.noise
+        return self.error(net(state, sample.level, sample.cond), sample)
 
     def number(self, seed: int, step: int) -> int:
         """See `motionloom_train.captured.Capturable`."""
         return number_of(seed, step)
 
-    def sample(self, seed: int, step: int, rows: int) -> Drawn:
+    def sample(self, seed: int, step: int, rows: int) -> Sample:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
         window, picked = self.pick(seed, step, rows)
-        return self._noised(window, picked.to(self.device), self._generator(seed, step))
+        return self._noisy(window, picked.to(self.device), self._generator(seed, step))
 
     def _generator(self, seed: int, step: int) -> torch.Generator:
         return torch.Generator(self.device).manual_seed(self.number(seed, step))
 
-    def _noised(self, window: int, picked: Tensor, generator: torch.Generator) -> Drawn:
+    def _noisy(self, window: int, picked: Tensor, generator: torch.Generator) -> Sample:
         batch: Batch = self.batches.show(window, picked)
         rows = len(batch.lengths)
         level = self.random_levels(rows, generator)
         noise = torch.randn(batch.features.shape, generator=generator, device=self.device)
         keep = torch.rand(rows, generator=generator, device=self.device) >= self.recipe.drop_text
-        return Drawn(batch.features, level, noise, self.words.condition(batch.texts, batch.lengths).choose(keep))
+        return Sample(batch.features, level, noise, self.words.condition(batch.texts, batch.lengths).choose(keep))
 
     def random_levels(self, rows: int, generator: torch.Generator) -> Tensor:
         """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
@@ -163,11 +163,11 @@ class CleanError:
         often = (self.schedule.steps * (1 - torch.rand(rows, **how) ** 2)).ceil().clamp(min=1).long()
         return torch.where(torch.rand(rows, **how) < self.recipe.early, often, level)
 
-    def error(self, denoised: Tensor, drawn: Drawn) -> Tensor:
+    def error(self, denoised: Tensor, sample: Sample) -> Tensor:
         """What an estimate of the clean data costs."""
-        error = masked_error(denoised, drawn.clean, drawn.cond.lengths, self.scale)
+        error = masked_error(denoised, sample.clean, sample.cond.lengths, self.scale)
         if self.recipe.displacement:
-            moved = displacement_error(denoised, drawn.clean, drawn.cond.lengths, self.mean, self.std)
+            moved = displacement_error(denoised, sample.clean, sample.cond.lengths, self.mean, self.std)
             error = error + self.recipe.displacement * moved
         return error
 
@@ -211,8 +211,8 @@ def displacement_error(denoised: Tensor, clean: Tensor, lengths: Tensor, mean: T
     this is what makes neighbouring tokens agree, and planted feet stay.
     """
     block = LAYOUT["joint_velocity"]
-    wanted = (clean[:, :-1, block] * std[block] + mean[block]).unflatten(-1, (22, 3))
-    error = ((displacements(denoised.float() * std + mean) - wanted) ** 2).sum(-1) / (3 * std[block].mean() ** 2)
+    target = (clean[:, :-1, block] * std[block] + mean[block]).unflatten(-1, (22, 3))
+    error = ((displacements(denoised.float() * std + mean) - target) ** 2).sum(-1) / (3 * std[block].mean() ** 2)
     planted = clean[:, :-1, LAYOUT["contacts"]] * std[LAYOUT["contacts"]] + mean[LAYOUT["contacts"]] > 0.5
     weight = torch.ones_like(error)
     for place, foot in enumerate(FEET):  # a list of places would be copied to the GPU, which then waits

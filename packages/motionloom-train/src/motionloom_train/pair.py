@@ -51,9 +51,9 @@ class Settings:
     prefix: float = 0.35
     """Share of the samples whose beginning is given."""
     react: float = 0.15
-    """Share of the samples one of whose people is given; the others are drawn from a text alone."""
+    """Share of the samples one of whose people is given; the others have a text alone."""
     silent: float = 0.5
-    """Share of the former two without their text, which nobody needs to say there."""
+    """Share of the former two without their text, which is optional there."""
     early: float = 0.5
     """Share of the samples at levels as samplers take them, most near pure noise; the others even (published)."""
     place: float = 1.0
@@ -66,26 +66,27 @@ class Settings:
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values out of range."""
-        made = parse_table(Settings, "[pair]", values)
-        shares = (made.prefix, made.react, made.prefix + made.react, made.silent, made.early, made.faint)
-        if not all(0 <= share <= 1 for share in shares) or not all(0 <= w <= 1e3 for w in (made.place, made.sight)):
+        settings = parse_table(Settings, "[pair]", values)
+        shares = (settings.prefix, settings.react, settings.silent, settings.early, settings.faint)
+        total, weights = settings.prefix + settings.react, (settings.place, settings.sight)
+        if not all(0 <= share <= 1 for share in (*shares, total)) or not all(0 <= w <= 1e3 for w in weights):
             raise MotionloomError("[pair] prefix, react, silent, early and faint are shares, place and sight weights")
-        return made
+        return settings
 
     def config(self, prior: Prior) -> PairConfig:
         """The block's sizes for a prior."""
         split = None if self.split < 0 else self.split
-        made = fitting(prior.net.config, layers=self.layers, split=split, aware=self.aware)
-        return replace(made, dropout=self.dropout)
+        config = fitting(prior.net.config, layers=self.layers, split=split, aware=self.aware)
+        return replace(config, dropout=self.dropout)
 
 
-class Drawn(NamedTuple):
+class Sample(NamedTuple):
     """Samples of one step; rows 2k and 2k + 1 are two people."""
 
     clean: Tensor
     """(rows, 1 + frames, 263) states: D in the first slot, standardised frames behind it."""
     noise: Tensor
-    given: Tensor
+    known: Tensor
     """(rows, 1 + frames) bool: slots that are given, free of noise."""
     level: Tensor
     """(rows,) the same for both people."""
@@ -124,27 +125,27 @@ class PairError:
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`; rows: pairs."""
-        drawn = self.sample(seed, step, rows)
-        return self.total(self.parts(self.denoised(net, drawn), drawn))
+        sample = self.sample(seed, step, rows)
+        return self.total(self.parts(self.denoised(net, sample), sample))
 
-    def sample(self, seed: int, step: int, pairs: int) -> Drawn:
+    def sample(self, seed: int, step: int, pairs: int) -> Sample:
         """What a step looks at, from ``(seed, step)`` alone."""
         rng = np.random.default_rng((seed, step))
         windows = self.recipe.windows
         window = int(rng.choice(windows, p=np.array(self.recipe.shares) / sum(self.recipe.shares)))
         return self.noised(rng, self.duets.draw(rng, window, pairs))
 
-    def noised(self, rng: np.random.Generator, crops: Crops) -> Drawn:
+    def noised(self, rng: np.random.Generator, crops: Crops) -> Sample:
         """Crops with a task, a text or none, a level and noise each."""
-        pairs, said = len(crops.texts), self.settings
+        pairs, settings = len(crops.texts), self.settings
         frames = crops.features.shape[2]
         kind = rng.random(pairs)
-        begun, react = kind < said.prefix, (kind >= said.prefix) & (kind < said.prefix + said.react)
-        given = known_slots(rng, begun, react, crops.lengths, frames)
-        dropped = np.where(begun | react, said.silent, self.recipe.drop_text)
+        begun, react = kind < settings.prefix, (kind >= settings.prefix) & (kind < settings.prefix + settings.react)
+        known = known_slots(rng, begun, react, crops.lengths, frames)
+        dropped = np.where(begun | react, settings.silent, self.recipe.drop_text)
         keep = (rng.random(pairs) >= dropped) & (crops.texts > 0)
         at = rng.random(pairs)
-        at = np.where(rng.random(pairs) < said.early, 1 - (1 - at) ** 2, at)
+        at = np.where(rng.random(pairs) < settings.early, 1 - (1 - at) ** 2, at)
         level = np.clip(np.ceil(at * self.schedule.steps), 1, self.schedule.steps).astype(np.int64)
         both = [torch.from_numpy(np.repeat(x, 2)) for x in (crops.lengths, crops.texts, keep, level)]
         lengths, texts, keeps, levels = (x.to(self.device) for x in both)
@@ -155,35 +156,35 @@ class PairError:
         clean[:, 1:] *= valid[..., None]
         noise = torch.from_numpy(rng.standard_normal(clean.shape, dtype=np.float32)).to(self.device)
         cond = Condition(*(x.to(self.device) for x in cond))
-        return Drawn(clean, noise, torch.from_numpy(given).to(self.device), levels, cond, lengths)
+        return Sample(clean, noise, torch.from_numpy(known).to(self.device), levels, cond, lengths)
 
-    def denoised(self, net: nn.Module, drawn: Drawn) -> Tensor:
+    def denoised(self, net: nn.Module, sample: Sample) -> Tensor:
         """The network's estimate of the clean states."""
-        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise * ~drawn.given[..., None])
-        return net(state, drawn.level, self._net.bind(drawn.cond))
+        state = noised(self.schedule, sample.clean, sample.level, sample.noise * ~sample.known[..., None])
+        return net(state, sample.level, self._net.bind(sample.cond))
 
-    def parts(self, denoised: Tensor, drawn: Drawn) -> Parts:
+    def parts(self, denoised: Tensor, sample: Sample) -> Parts:
         """What an estimate of the clean states costs; given slots are as they are given."""
-        shown = torch.where(drawn.given[..., None], drawn.clean, denoised.float())
-        valid = torch.arange(shown.shape[1] - 1, device=shown.device) < drawn.lengths[:, None]
-        free = valid & ~drawn.given[:, 1:]
-        error = ((shown - drawn.clean) ** 2)[:, 1:]
+        guess = torch.where(sample.known[..., None], sample.clean, denoised.float())
+        valid = torch.arange(guess.shape[1] - 1, device=guess.device) < sample.lengths[:, None]
+        free = valid & ~sample.known[:, 1:]
+        error = ((guess - sample.clean) ** 2)[:, 1:]
         motion = _over_rows((error * self.scale).mean(-1), free)
-        place = _over_rows(((shown - drawn.clean) ** 2)[:, :1, :PLACE].mean(-1), ~drawn.given[:, :1])
-        (d0, x0), (d1, x1) = part(drawn.clean), part(shown)
+        place = _over_rows(((guess - sample.clean) ** 2)[:, :1, :PLACE].mean(-1), ~sample.known[:, :1])
+        (d0, x0), (d1, x1) = part(sample.clean), part(guess)
         sight = displacement = torch.zeros(())
         if self.settings.sight:
             away = self.sight.error(d1, x1 * self.std + self.mean, d0, x0 * self.std + self.mean)
             anyone = free | free.unflatten(0, (-1, 2)).flip(1).flatten(0, 1)
-            sight = _over_rows(away * self.shares[drawn.level][:, None], anyone)
+            sight = _over_rows(away * self.shares[sample.level][:, None], anyone)
         if self.recipe.displacement:
-            displacement = displacement_error(x1, x0, drawn.lengths, self.mean, self.std)
+            displacement = displacement_error(x1, x0, sample.lengths, self.mean, self.std)
         return Parts(motion, place, sight, displacement)
 
     def total(self, parts: Parts) -> Tensor:
         """The loss."""
-        said = self.settings
-        total = parts.motion + said.place * parts.place + said.sight * parts.sight
+        total = parts.motion + self.settings.place * parts.place
+        total = total + self.settings.sight * parts.sight
         return total + self.recipe.displacement * parts.displacement
 
 
@@ -202,10 +203,10 @@ def known_slots(
     pairs, slots = len(begun), np.arange(frames + 1)
     count = np.where(rng.random(pairs) < 0.5, BEGUN, rng.integers(SHORTEST_BEGUN, LONGEST_BEGUN + 1, pairs))
     count = np.minimum(count, lengths // 2)
-    given = np.zeros((pairs, 2, frames + 1), dtype=bool)
-    given |= (begun[:, None] & (slots <= count[:, None]))[:, None]
-    given[np.arange(pairs), rng.integers(0, 2, pairs)] |= react[:, None] & (slots > 0) & (slots <= lengths[:, None])
-    return given.reshape(2 * pairs, -1)
+    known = np.zeros((pairs, 2, frames + 1), dtype=bool)
+    known |= (begun[:, None] & (slots <= count[:, None]))[:, None]
+    known[np.arange(pairs), rng.integers(0, 2, pairs)] |= react[:, None] & (slots > 0) & (slots <= lengths[:, None])
+    return known.reshape(2 * pairs, -1)
 
 
 # Held-out pairs ------------------------------------------------------------------------------------------------------
@@ -232,17 +233,17 @@ class Held:
     """Windows of pairs that no training saw."""
 
     objective: PairError
-    drawn: Drawn
+    sample: Sample
 
     @torch.no_grad()
     def report(self, net: PairNet) -> Report:
         """How well a block does on them."""
-        denoised = self.objective.denoised(net.eval(), self.drawn)
-        parts, drawn = self.objective.parts(denoised, self.drawn), self.drawn
-        shown = torch.where(drawn.given[..., None], drawn.clean, denoised.float())
+        denoised = self.objective.denoised(net.eval(), self.sample)
+        parts, sample = self.objective.parts(denoised, self.sample), self.sample
+        guess = torch.where(sample.known[..., None], sample.clean, denoised.float())
         mean, std = self.objective.mean, self.objective.std
-        ways = [self.objective.sight.partner(d, x * std + mean) for d, x in (part(shown), part(drawn.clean))]
-        off = (ways[0] - ways[1])[..., 2:].norm(dim=-1)[~drawn.given[:, 1:]].mean()
+        ways = [self.objective.sight.partner(d, x * std + mean) for d, x in (part(guess), part(sample.clean))]
+        off = (ways[0] - ways[1])[..., 2:].norm(dim=-1)[~sample.known[:, 1:]].mean()
         return Report(float(self.objective.total(parts)), float(parts.motion), float(parts.place), float(off))
 
 
@@ -269,21 +270,21 @@ def train_pair(run: Training, pairs: Sequence[Pair]) -> Path:
     pairs the last), and ``folder/last.safetensors`` those of the last. A recipe's ``batch`` counts pairs.
 
     Raises MotionloomError for settings that cannot be, and pairs that are all too short, or all for tests, or that
-    nobody described where a share of the samples is drawn from a text alone.
+    nobody described where a share of the samples has a text alone.
     """
     recipe, device = run.recipe, run.world.device
     settings = Settings.parse(recipe.pair)
     prior = Prior.load(recipe.start or "default")
-    seen = _usable([pair for pair in pairs if pair.split == "train"], recipe, settings)
+    train = _usable([pair for pair in pairs if pair.split == "train"], recipe, settings)
     torch.manual_seed(recipe.seed)
     config = settings.config(prior)
     mean, std = tensor(prior.mean, device), tensor(prior.std, device)
     base, talk = prior_module(prior).to(device), Talk(config, prior.net.config).to(device)
     net = PairNet(base, talk, prior.schedule, mean=mean, std=std)
-    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe, device=device)
-    seconds = sum(pair.frames for pair in seen) / FPS
-    about = f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(seen)} pairs of {seconds:.0f} s"
-    export = _Export(run, prior, config, held_out(objective, pairs), seen)
+    objective = PairError(net, prior, Duets(train), settings=settings, recipe=recipe, device=device)
+    seconds = sum(pair.frames for pair in train) / FPS
+    about = f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(train)} pairs of {seconds:.0f} s"
+    export = _Export(run, prior, config, held_out(objective, pairs), train)
     return run.run(objective, export, about, wrap=compiled(recipe, dynamic=True))
 
 

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from motionloom_train.low_rank import AdapterNet
 
 CHOICES = ("auto", "bf16", "float32", "off", "none")
-"""What a recipe may say; ``off`` and ``none`` are ``float32``."""
+"""The choices of a recipe; ``off`` and ``none`` are ``float32``."""
 ROWS = 256
 ENOUGH = 0.2
 """Seconds after which a product is not repeated."""
@@ -23,7 +23,7 @@ WORTH = 1.2
 
 
 def choose(net: nn.Module, device: str) -> tuple[str, str]:
-    """The quicker precision, ``bf16`` or ``float32``, and one sentence that says why.
+    """The quicker precision, ``bf16`` or ``float32``, and one sentence with the reason.
 
     On a CPU the largest product of the network is measured once in both, with as many threads as are set. A GPU
     multiplies in bfloat16 wherever it has instructions for it.

@@ -55,7 +55,7 @@ class Settings:
     condition_dropout: float = 0.1
     """Share of samples without a condition (published: 0.2)."""
     smoothed: float = 0.0
-    """Share of samples whose past is given smoothed, as pasts are that the network drew itself: else it takes their
+    """Share of samples whose past is given smoothed, as the network's own results are: else it takes their
     smoothness for calm, and long motions come to rest."""
 
     @staticmethod
@@ -72,12 +72,12 @@ class Settings:
         return settings
 
 
-class Drawn(NamedTuple):
+class Sample(NamedTuple):
     """Windows of one step."""
 
     features: np.ndarray
     """(rows, frames, channels) float32."""
-    shown: np.ndarray
+    context: np.ndarray
     """The same as the condition shows it: some pasts are smoothed."""
     pose: np.ndarray
     """(rows, channels) the last observed pose."""
@@ -86,7 +86,7 @@ class Drawn(NamedTuple):
 
 
 class Windows:
-    """Random windows of recordings; recordings are drawn by the root of their length, windows in them evenly."""
+    """Random windows of recordings; recordings are sampled by the root of their length, windows in them evenly."""
 
     def __init__(
         self, recordings: tuple[Recording, ...], protocol: Protocol, *, variant: str, smoothed: float = 0.0
@@ -100,7 +100,7 @@ class Windows:
         self.starts = np.cumsum(self.lengths) - self.lengths
         self.shares = np.sqrt(self.lengths) / np.sqrt(self.lengths).sum()
 
-    def draw(self, seed: int, step: int, rows: int) -> Drawn:
+    def draw(self, seed: int, step: int, rows: int) -> Sample:
         """Windows, mirrored half of the time, and what is given of them; from ``(seed, step)`` alone."""
         rng = np.random.default_rng((seed, step))
         frames, layout = self.protocol.frames, self.layout
@@ -110,13 +110,13 @@ class Windows:
         flipped = rng.random(rows) < 0.5
         places[flipped] = layout.mirrored(places[flipped])
         past = self._pasts(rng, rows)
-        given = self._smoothed(np.random.default_rng((seed, step, 3)), places, past) if self.smoothed else places
-        place = self._place(rng, given[np.arange(rows), past - 1])
-        features, shown = layout.encode(places, place), layout.encode(given, place)
+        evidence = self._smoothed(np.random.default_rng((seed, step, 3)), places, past) if self.smoothed else places
+        place = self._place(rng, evidence[np.arange(rows), past - 1])
+        features, context = layout.encode(places, place), layout.encode(evidence, place)
         mask = np.stack([self._mask(rng, int(h)) for h in past])
-        pose = shown[np.arange(rows), past - 1]
-        drawn = (features, shown, pose, mask)
-        return Drawn(*(np.ascontiguousarray(x, dtype=np.float32) for x in drawn))
+        pose = context[np.arange(rows), past - 1]
+        arrays = (features, context, pose, mask)
+        return Sample(*(np.ascontiguousarray(x, dtype=np.float32) for x in arrays))
 
     def _smoothed(
         self, rng: np.random.Generator, places: NDArray[np.float64], past: NDArray[np.int64]
@@ -186,17 +186,17 @@ class Completion:
 
         The latter is standardised and weighted by its spread, between metres and equal weights for all frequencies.
         """
-        p, drawn = self.predictor, self.windows.draw(seed, step, rows)
+        p, sample = self.predictor, self.windows.draw(seed, step, rows)
         generator = torch.Generator().manual_seed(number_of(seed, step))
         low = 2 if p.variant == "published" else 1  # the published code never trains its first noisy level
         level = torch.randint(low, p.schedule.steps + 1, (rows,), generator=generator).to(self.device)
-        clean = tensor(p.to_state(drawn.features, drawn.pose), self.device)
+        clean = tensor(p.to_state(sample.features, sample.pose), self.device)
         noise = torch.randn(clean.shape, generator=generator).to(self.device)
         keep = (torch.rand(rows, generator=generator) >= self.condition_dropout).to(self.device)
-        condition = tensor(p.condition(drawn.shown, drawn.mask, drawn.pose), self.device)
+        condition = tensor(p.condition(sample.context, sample.mask, sample.pose), self.device)
         predicted = net(noised(p.schedule, clean, level, noise), level - 1, condition, keep)
-        wanted = noise if p.variant == "published" else clean
-        return ((predicted.float() - wanted) ** 2 * self.scale).mean()
+        target = noise if p.variant == "published" else clean
+        return ((predicted.float() - target) ** 2 * self.scale).mean()
 
 
 def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, schedule: str, levels: int) -> Predictor:
@@ -205,11 +205,11 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
     if settings.dct and settings.kept > frames:
         raise MotionloomError(f"[predictor] kept is {settings.kept}, and a window has {frames} frames; keep fewer")
     basis = Dct(frames, settings.kept) if settings.dct else Frames(frames)
-    kept = basis.kept
-    condition = condition_shape(layout, kept) if settings.variant == "masked" else None
+    count = basis.kept
+    condition = condition_shape(layout, count) if settings.variant == "masked" else None
     config = PredictorConfig(
         layout.channels,
-        kept,
+        count,
         settings.layers,
         settings.width,
         settings.heads,
@@ -217,9 +217,9 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
         condition,
         condition is not None,
     )
-    drawn = windows.draw(2**31 - 1, 0, STATISTICS)
-    pose = np.stack([drawn.pose.mean(0), drawn.pose.std(0, ddof=1).clip(min=1e-3)])
-    plain = np.zeros((kept, layout.channels), np.float32)
+    sample = windows.draw(2**31 - 1, 0, STATISTICS)
+    pose = np.stack([sample.pose.mean(0), sample.pose.std(0, ddof=1).clip(min=1e-3)])
+    plain = np.zeros((count, layout.channels), np.float32)
     predictor = Predictor(
         predictor_session(TransLinear(config)),
         SCHEDULES[schedule](levels),
@@ -235,7 +235,7 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
     )
     if settings.variant == "published":
         return predictor
-    state = predictor.to_state(drawn.features, drawn.pose)
+    state = predictor.to_state(sample.features, sample.pose)
     return replace(predictor, mean=state.mean(0), std=state.std(0, ddof=1).clip(min=1e-4))
 
 
@@ -263,10 +263,10 @@ def train_predictor(run: Training, protocol: Protocol) -> Path:
     held = _held(protocol, settings)
 
     def export(average: Average, step: int) -> None:
-        made = _finished(predictor, recipe, protocol, average, step=step, minutes=minutes)
-        save_predictor(made, run.place)
+        result = _finished(predictor, recipe, protocol, average, step=step, minutes=minutes)
+        save_predictor(result, run.place)
         if held is not None:
-            run.say(f"step {step}: held-out loss {_held_loss(made, held, settings):.4f}")
+            run.say(f"step {step}: held-out loss {_held_loss(result, held, settings):.4f}")
 
     about = f"{sum(p.numel() for p in net.parameters()):,} parameters, {minutes:.0f} minutes recorded"
     return run.run(objective, export, about, wrap=compiled(recipe))
@@ -280,9 +280,9 @@ def _held(protocol: Protocol, settings: Settings) -> Windows | None:
 
 
 @torch.no_grad()
-def _held_loss(made: Predictor, held: Windows, settings: Settings) -> float:
-    net = predictor_module(made)
-    return float(Completion(net, made, held, condition_dropout=settings.condition_dropout).loss(net, 0, 0, HELD))
+def _held_loss(predictor: Predictor, held: Windows, settings: Settings) -> float:
+    net = predictor_module(predictor)
+    return float(Completion(net, predictor, held, condition_dropout=settings.condition_dropout).loss(net, 0, 0, HELD))
 
 
 def _finished(
@@ -290,8 +290,8 @@ def _finished(
 ) -> Predictor:
     net = TransLinear(predictor.net.config)
     net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
-    seen = len({r.subject for r in protocol.split("train")})
+    count = len({r.subject for r in protocol.split("train")})
     notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "minutes": round(float(minutes), 1)}
-    notes |= {"data": protocol.name, "subjects": seen, "from": Path(recipe.start).stem}
+    notes |= {"data": protocol.name, "subjects": count, "from": Path(recipe.start).stem}
     card = Card(recipe.name, recipe.licence or protocol.licence, protocol.licence, notes)
     return replace(predictor, net=predictor_session(net), card=card)

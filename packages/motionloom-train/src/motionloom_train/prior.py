@@ -32,7 +32,7 @@ from motionloom_train.objectives import CleanError, Conditioned, WordBank
 from motionloom_train.recipe import Recipe
 from motionloom_train.tensors import tensor
 
-WRITTEN = {"human": "captions that people wrote", "index": "descriptions of the collections"}
+CAPTION_GROUPS = {"human": "captions that people wrote", "index": "descriptions of the collections"}
 """What the table calls the groups of items that are no single action."""
 
 
@@ -49,13 +49,13 @@ def known_table(motions: MotionSet, encoder: TextEncoder) -> Known:
         frames.setdefault(name, []).append((item.start, item.start + item.frames))
         texts.setdefault(name, {}).update(dict.fromkeys(item.texts))
     seconds = {group: _covered(spans) / FPS for group, spans in frames.items()}
-    listed = sorted(seconds, key=lambda group: (group in WRITTEN, -seconds[group], group))
-    numbers = dict.fromkeys(number for group in listed for number in texts[group])
+    groups = sorted(seconds, key=lambda group: (group in CAPTION_GROUPS, -seconds[group], group))
+    numbers = dict.fromkeys(number for group in groups for number in texts[group])
     return known_sentences(
         [motions.texts[number] for number in numbers],
-        {WRITTEN.get(g, g): seconds[g] for g in listed},
+        {CAPTION_GROUPS.get(g, g): seconds[g] for g in groups},
         encoder,
-        first=[motions.texts[next(iter(texts[group]))] for group in listed if texts[group]],
+        first=[motions.texts[next(iter(texts[group]))] for group in groups if texts[group]],
     )
 
 
@@ -99,9 +99,9 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
 
     def wrap(module: nn.Module) -> nn.Module:
         assert isinstance(module, PriorNet)
-        called: nn.Module = Conditioned(module)
+        model: nn.Module = Conditioned(module)
         # sentences have many lengths
-        return torch.compile(called, dynamic=True) if recipe.compile and not capture else called  # type: ignore[return-value]
+        return torch.compile(model, dynamic=True) if recipe.compile and not capture else model  # type: ignore[return-value]
 
     about = (
         f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
@@ -126,8 +126,7 @@ def text_encoder(weights: str) -> TextEncoder:
 
 
 def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text: TextEncoder) -> Prior:
-    config = NetConfig.parse(recipe.net)
-    net = PriorNet(config)
+    net = PriorNet(NetConfig.parse(recipe.net))
     net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
     notes: dict[str, Any] = {"steps": step, "recipe": recipe.name, "seed": recipe.seed}
     notes |= {"minutes": round(motions.minutes, 1)} | ({"start": recipe.start} if recipe.start else {})

@@ -32,11 +32,11 @@ class Recipe:
     batch: int = 64
     """Windows per step and process."""
     windows: list[int] = field(default_factory=lambda: [48, 80, 120, 196])
-    """Lengths of windows in frames, one drawn per step."""
+    """Lengths of windows in frames, one sampled per step."""
     shares: list[float] = field(default_factory=lambda: [0.2, 0.3, 0.35, 0.15])
-    """How often each length is drawn."""
+    """How often each length is sampled."""
     favour: dict[str, Any] = field(default_factory=dict)
-    """How often measured labels are drawn, 1 being usual; empty: `motionloom_train.data.batches.FAVOUR`."""
+    """How often measured labels are sampled, 1 being usual; empty: `motionloom_train.data.batches.FAVOUR`."""
     rate: float = 8e-4
     """Learning rate after the warm-up."""
     warmup: int = 300
@@ -118,17 +118,17 @@ def parse_table(kind: type[Table], place: str, values: Mapping[str, Any]) -> Tab
     Raises MotionloomError for a setting there is not, and for a value of the wrong kind; words are checked by whoever
     knows which there are.
     """
-    hints, found = get_type_hints(kind), dict(values)
+    hints, settings = get_type_hints(kind), dict(values)
     for key, value in values.items():
         if key not in hints:
             raise MotionloomError(f"{place} no setting {key!r}; the settings are {', '.join(hints)}")
         origin = get_origin(hints[key])
-        wanted = str if origin is Literal else origin or hints[key]
-        fits = isinstance(value, (int, float) if wanted is float else wanted)
-        if not fits or (wanted is not bool and isinstance(value, bool)):
-            raise MotionloomError(f"{place} {key} must be of kind {wanted.__name__}; got {_shown(value)}")
-        found[key] = float(value) if wanted is float else value
-    return kind(**found)
+        expected = str if origin is Literal else origin or hints[key]
+        fits = isinstance(value, (int, float) if expected is float else expected)
+        if not fits or (expected is not bool and isinstance(value, bool)):
+            raise MotionloomError(f"{place} {key} must be of kind {expected.__name__}; got {_repr(value)}")
+        settings[key] = float(value) if expected is float else value
+    return kind(**settings)
 
 
 LIMITS: Mapping[str, float] = {
@@ -150,16 +150,16 @@ def _check(path: Path, recipe: Recipe) -> None:
     lists = {"sources": str, "prompts": str, "windows": int, "shares": int | float}
     for key, kind in lists.items():
         if not all(isinstance(value, kind) and not isinstance(value, bool) for value in getattr(recipe, key)):
-            raise MotionloomError(f"{path}: an entry of {key} is of the wrong kind: {_shown(getattr(recipe, key))}")
+            raise MotionloomError(f"{path}: an entry of {key} is of the wrong kind: {_repr(getattr(recipe, key))}")
     for label, value in recipe.favour.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not 0 <= value <= 1e6:
-            raise MotionloomError(f"{path}: favour.{label} must be a number from 0 to 1e6; got {_shown(value)}")
+            raise MotionloomError(f"{path}: favour.{label} must be a number from 0 to 1e6; got {_repr(value)}")
     if not re.fullmatch(r"\w[\w.-]{0,63}", recipe.name):
         raise MotionloomError(f"{path}: the name {recipe.name!r} becomes a file's; use letters, digits, _ - .")
     for key, limit in LIMITS.items():
         if not 0 <= getattr(recipe, key) <= limit:
-            raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {_shown(getattr(recipe, key))}")
+            raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {_repr(getattr(recipe, key))}")
     if not all(_in_range(recipe)):
         raise MotionloomError(
             f"{path}: a number or a choice is out of its range; see the comments of recipes/default.toml"
@@ -192,8 +192,8 @@ def changes(pairs: list[str]) -> dict[str, Any]:
     """``KEY=VALUE`` words as recipe entries, the values written as in TOML (text needs no quotes)."""
     result: dict[str, Any] = {}
     for pair in pairs:
-        key, found, value = pair.partition("=")
-        if not found:
+        key, mark, value = pair.partition("=")
+        if not mark:
             raise MotionloomError(f"{pair!r} is not of the form KEY=VALUE, such as steps=20000")
         try:
             result = _merged(result, _parsed(f"{key} = {value}"))
@@ -202,14 +202,14 @@ def changes(pairs: list[str]) -> dict[str, Any]:
     return result
 
 
-def _parsed(said: str) -> dict[str, Any]:
+def _parsed(text: str) -> dict[str, Any]:
     """TOML as a dictionary; raises ValueError or RecursionError for anything else.
 
     Keys of keys are counted first: the time that the parser takes grows with the square of their number.
     """
-    if any(line.count(".") > MAX_DOTS for line in said.splitlines()):
+    if any(line.count(".") > MAX_DOTS for line in text.splitlines()):
         raise ValueError(f"a line has more than {MAX_DOTS} dots")
-    return tomllib.loads(said)
+    return tomllib.loads(text)
 
 
 def _check_whole_numbers(path: Path, values: dict[str, Any]) -> None:
@@ -220,10 +220,10 @@ def _check_whole_numbers(path: Path, values: dict[str, Any]) -> None:
         if isinstance(value, dict | list):
             inside += value.values() if isinstance(value, dict) else value
         elif isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise MotionloomError(f"{path}: a number of TOML has at most 64 bits; got {_shown(value)}")
+            raise MotionloomError(f"{path}: a number of TOML has at most 64 bits; got {_repr(value)}")
 
 
-def _shown(value: object) -> str:
+def _repr(value: object) -> str:
     """A value as messages write it; a number of thousands of digits has no decimal text at all."""
     try:
         return repr(value)[:80]

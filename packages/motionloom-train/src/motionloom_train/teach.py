@@ -1,8 +1,8 @@
 """Teaching a prior an action or a style from a few clips: a low-rank adapter, and what was known stays.
 
 A step sees two kinds of rows. Some show a clip, with its caption, and cost what a clip costs in training a prior. The
-others show what the prior itself draws for sentences it knows, some of them without their sentence, and cost what the
-changed network's estimate differs from the unchanged one's (learning without forgetting, Li & Hoiem 2016; prior
+others show what the prior itself generates for sentences it knows, some of them without their sentence, and cost what
+the changed network's estimate differs from the unchanged one's (learning without forgetting, Li & Hoiem 2016; prior
 preservation, Ruiz et al. 2023). Since nothing is taught without words, guidance strengthens what was taught.
 """
 
@@ -39,9 +39,9 @@ from motionloom_train.tensors import find_device, noised, number_of, tensor
 WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
 """Frames of the windows that a step sees, and how often."""
 DRAWS, DRAWN_FRAMES, DRAWN_STEPS = 96, 100, 12
-"""Motions that the prior draws of what it knows, their frames and the steps each takes."""
+"""Motions that the prior generates of what it knows, their frames and the steps each takes."""
 OTHERS, FAR = 2000, 0.9
-"""Known sentences besides those of the drawn motions. Above this share of the levels, where hardly anything of a motion
+"""Known sentences besides those of these motions. Above this share of the levels, where hardly anything of a motion
 is left and it is decided what will be shown, one of these is kept instead of the motion's own."""
 UNLIKE = 0.6
 """Cosine under which they must be to what is taught, so that other words for it may change as well."""
@@ -50,7 +50,7 @@ KEEP_WEIGHT = 2.0
 SILENT = 0.25
 """Share of those without their sentence."""
 SAME = 0.9
-"""Cosine of vectors from which on a known sentence says what is taught, and is not kept as it was."""
+"""Cosine of vectors from which on a known sentence means what is taught, and is not kept as it was."""
 LIKE = 16
 """Known sentences that are likest to what is taught: they are kept in any case."""
 AGAIN = 0.5
@@ -68,7 +68,7 @@ _WHOLE = re.compile(r"(an?|the|he|she|they|my|our|his|her|some\w*|[a-z]+ing)\b")
 
 @dataclass(frozen=True, kw_only=True)
 class Lesson(Teach):
-    """How something is taught: what is asked, and how it is trained."""
+    """How something is taught: the request, and how it is trained."""
 
     name: str = like(Teach, "name", default="adapter")
     amp: str = like(Teach, "amp", words=CHOICES)
@@ -84,12 +84,12 @@ def teach(
     device: str = "cpu",
     say: Say = silent,
 ) -> Adapter:
-    """An adapter that makes ``prior`` show what the examples show where their captions are asked for.
+    """An adapter that makes ``prior`` show what the examples show for their captions.
 
     device: PyTorch's, that is taught on; motions are sampled where the prior is.
     The same seed teaches the same on the same machine with as many threads and the same `Lesson.amp`, which the
-    adapter's notes tell. Raises `MotionloomError` where there is nothing to learn from, and for a prior that does not
-    draw 263 numbers a frame at 20 per second.
+    adapter's notes have. Raises `MotionloomError` where there is nothing to learn from, and for a prior that does not
+    generate 263 numbers a frame at 20 per second.
     """
     find_device(device)
     lesson = lesson or Lesson()
@@ -101,10 +101,14 @@ def teach(
     if not examples:
         raise MotionloomError("there is no clip; give at least one to learn from")
     captions = list(dict.fromkeys(text for example in examples for text in example.captions))
-    kept, others = known_prompts(prior, captions, lesson.seed)
-    say(f"drawing {len(kept)} motions that are known already")
-    drawn = sample_features(
-        prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
+    prompts, others = known_prompts(prior, captions, lesson.seed)
+    say(f"drawing {len(prompts)} motions that are known already")
+    motions = sample_features(
+        prior,
+        prompts,
+        [DRAWN_FRAMES] * len(prompts),
+        seeds=[lesson.seed + i for i in range(len(prompts))],
+        steps=DRAWN_STEPS,
     )
     torch.manual_seed(lesson.seed)
     net = AdapterNet(prior_module(prior), lesson.rank, given_rank=0, taught=True)
@@ -112,7 +116,7 @@ def teach(
     if amp == "auto":
         amp, why = choose(net, device)
         say(why)
-    known = list(zip(kept, drawn, strict=True))
+    known = list(zip(prompts, motions, strict=True))
     objective = Teaching(net, prior, examples, known, others, keep=lesson.keep, device=device)
     recipe = Recipe(
         name=lesson.name,
@@ -134,17 +138,17 @@ def teach(
 
 
 def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> tuple[list[str], list[str]]:
-    """`DRAWS` sentences that the prior knows and that do not say what ``captions`` say; up to `OTHERS` further ones.
+    """`DRAWS` sentences that the prior knows and that do not mean what ``captions`` mean; up to `OTHERS` further ones.
 
-    Of the former those that are likest to the captions come first: from them the new action must be told apart. The
+    Of the former those that are likest to the captions come first: from them the new action must be distinguished. The
     latter are unlike the captions. The sentences are those of the prior's file, or of measured labels where it has
     none.
     """
     rng = np.random.default_rng((seed, 17))
-    pool = list(prior.known.sentences) if prior.known else [phrase for said in LABELS.values() for phrase in said]
+    pool = list(prior.known.sentences) if prior.known else [phrase for phrases in LABELS.values() for phrase in phrases]
     vectors = prior.text.encode([bare(text) for text in pool]).pooled if not prior.known else prior.known.vectors
-    asked = prior.text.encode([bare(text) for text in captions]).pooled
-    like = (unit(vectors) @ unit(asked).T).max(1)
+    target = prior.text.encode([bare(text) for text in captions]).pooled
+    like = (unit(vectors) @ unit(target).T).max(1)
     order = [int(i) for i in (-like).argsort(stable=True) if like[i] < SAME]
     if not order:
         raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
@@ -152,8 +156,8 @@ def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> tuple[lis
     chosen = [*order[:LIKE], *rest]
     chosen = [chosen[i % len(chosen)] for i in range(DRAWS)]
     others = [i for i in rest if like[i] < UNLIKE][:OTHERS]
-    said = [text if _WHOLE.match(text) else f"a person {text}" for text in pool]
-    return [said[i] for i in chosen], [said[i] for i in others]
+    sentences = [text if _WHOLE.match(text) else f"a person {text}" for text in pool]
+    return [sentences[i] for i in chosen], [sentences[i] for i in others]
 
 
 def wordings(caption: str) -> tuple[str, ...]:
@@ -172,7 +176,7 @@ class Teaching:
         net: AdapterNet,
         prior: Prior,
         examples: Sequence[Example],
-        drawn: Sequence[tuple[str, np.ndarray]],
+        known: Sequence[tuple[str, np.ndarray]],
         others: Sequence[str] = (),
         *,
         keep: float,
@@ -182,14 +186,14 @@ class Teaching:
         self.keep, self.device = keep, device
         self.mean, self.std = tensor(prior.mean, device), tensor(prior.std, device)
         self.examples = examples
-        shown = [((e.features - prior.mean) / prior.spread).astype(np.float32) for e in examples]
-        self.shown = [tensor(one, device) for one in shown]
-        self.begins = [_beginnings(e, one) for e, one in zip(examples, shown)]
-        self.drawn = torch.stack([tensor((f - prior.mean) / prior.spread, device) for _, f in drawn])
+        features = [((e.features - prior.mean) / prior.spread).astype(np.float32) for e in examples]
+        self.features = [tensor(one, device) for one in features]
+        self.begins = [_beginnings(e, one) for e, one in zip(examples, features)]
+        self.known = torch.stack([tensor((f - prior.mean) / prior.spread, device) for _, f in known])
         texts = dict.fromkeys(text for e in examples for caption in e.captions for text in wordings(caption))
-        texts |= dict.fromkeys([*(prompt for prompt, _ in drawn), *others])
+        texts |= dict.fromkeys([*(prompt for prompt, _ in known), *others])
         self.numbers = {text: number for number, text in enumerate(texts)}
-        self.prompts = [self.numbers[prompt] for prompt, _ in drawn]
+        self.prompts = [self.numbers[prompt] for prompt, _ in known]
         self.others = [self.numbers[prompt] for prompt in others]
         self.words = WordBank(prior.text, tuple(texts), progress=lambda line: None)
         self.scale = feature_scale().to(self.device)
@@ -198,43 +202,43 @@ class Teaching:
         """See `motionloom_train.objectives.Objective`."""
         rng = np.random.default_rng((seed, step))
         window = int(rng.choice(WINDOWS, p=SHARES))
-        kept = min(round(self.keep * rows), rows - 1)
-        clean, texts, lengths = self._rows(rng, window, rows, kept)
+        own = rows - min(round(self.keep * rows), rows - 1)
+        clean, texts, lengths = self._rows(rng, window, rows, own)
         generator = torch.Generator().manual_seed(number_of(seed, step))
         even = torch.rand(rows, generator=generator, dtype=torch.float64)
         level = (self.schedule.steps * (1 - even**2)).ceil().long().clamp(1, self.schedule.steps)  # as samplers go
         noise = torch.randn(clean.shape, generator=generator).to(clean)
-        for row in range(rows - kept, rows if self.others else 0):
+        for row in range(own, rows if self.others else 0):
             if level[row] > FAR * self.schedule.steps:
                 texts[row] = int(rng.choice(self.others))
         speaks = torch.ones(rows, dtype=torch.bool)
-        speaks[rows - kept :] = torch.rand(kept, generator=generator) >= SILENT
+        speaks[own:] = torch.rand(rows - own, generator=generator) >= SILENT
         cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
         cond = Condition(*(part.to(self.device) for part in cond))
         state = noised(self.schedule, clean, level, noise)
-        denoised, before = net(state, level, cond), clean[rows - kept :]
-        if kept:
+        denoised, before = net(state, level, cond), clean[own:]
+        if own < rows:
             with torch.no_grad():
-                old = Condition(*(part[rows - kept :] for part in cond))
-                before = self.base(state[rows - kept :], level[rows - kept :], self.base.bind(old))
-        return self._error(denoised, clean, before, cond.lengths, rows - kept)
+                old = Condition(*(part[own:] for part in cond))
+                before = self.base(state[own:], level[own:], self.base.bind(old))
+        return self._error(denoised, clean, before, cond.lengths, own)
 
-    def _rows(self, rng: np.random.Generator, window: int, rows: int, kept: int) -> tuple[Tensor, list[int], list[int]]:
+    def _rows(self, rng: np.random.Generator, window: int, rows: int, own: int) -> tuple[Tensor, list[int], list[int]]:
         """Windows (rows, window, 263), first those of examples, then what the prior drew; their texts and lengths."""
-        clean = torch.zeros(rows, window, self.drawn.shape[2], device=self.device)
+        clean = torch.zeros(rows, window, self.known.shape[2], device=self.device)
         texts, lengths = [], []
-        for row in range(rows - kept):
+        for row in range(own):
             number = int(rng.integers(len(self.examples)))
             first = _first(self.examples[number], self.begins[number], window, rng)
-            part = self.shown[number][first : first + window]
+            part = self.features[number][first : first + window]
             clean[row, : len(part)] = part
-            said = wordings(str(rng.choice(self.examples[number].captions)))
-            texts.append(self.numbers[said[int(rng.integers(len(said)))]])
+            choices = wordings(str(rng.choice(self.examples[number].captions)))
+            texts.append(self.numbers[choices[int(rng.integers(len(choices)))]])
             lengths.append(len(part))
-        for row in range(rows - kept, rows):
-            number = int(rng.integers(len(self.drawn)))
-            length = min(window, self.drawn.shape[1])
-            clean[row, :length] = self.drawn[number, :length]
+        for row in range(own, rows):
+            number = int(rng.integers(len(self.known)))
+            length = min(window, self.known.shape[1])
+            clean[row, :length] = self.known[number, :length]
             texts.append(self.prompts[number])
             lengths.append(length)
         return clean, texts, lengths
@@ -256,7 +260,7 @@ def _beginnings(example: Example, features: np.ndarray) -> np.ndarray:
     features: (frames, 263) of the example, standardised. Windows that begin anywhere in a repetition show the same
     sentence with every phase, and the mean of all phases is a body that hardly moves.
     """
-    begin, end = example.shown
+    begin, end = example.span
     poses = features[begin:end, LAYOUT["ric"]]
     far = np.sqrt(((poses - poses[0]) ** 2).mean(axis=1))
     far = np.convolve(np.pad(far, 2, "edge"), np.full(5, 0.2), "valid")
@@ -271,7 +275,7 @@ def _beginnings(example: Example, features: np.ndarray) -> np.ndarray:
 def _first(example: Example, begins: np.ndarray, window: int, rng: np.random.Generator) -> int:
     """Where a window begins: with a repetition; else anywhere in a loop or a long clip, or so that it shows all of what
     was recorded, soon."""
-    begin, end = example.shown
+    begin, end = example.span
     frames = len(example.features)
     if end - begin >= window or example.looped:
         if (fits := begins[begins <= end - window]).size:
@@ -301,7 +305,7 @@ def _adapter(
     prior: Prior, examples: Sequence[Example], captions: list[str], lesson: Lesson, average: Average
 ) -> Adapter:
     recorded = [e for e in examples if not e.name.startswith("M")]
-    seconds = sum(e.shown[1] - e.shown[0] for e in recorded if not e.looped) / FPS
+    seconds = sum(e.span[1] - e.span[0] for e in recorded if not e.looped) / FPS
     notes = {
         "captions": captions[:64],
         "clips": len(recorded),

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import main
-from tests_train.data import people as made
+from tests_train.data import people
 
 
 def test_a_folder_of_bvh_files_becomes_a_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made.write_bvh(tmp_path / "mine" / "stroll.bvh", made.walker(seconds=2.5))
+    people.write_bvh(tmp_path / "mine" / "stroll.bvh", people.walker(seconds=2.5))
     assert main(["data", "build", str(tmp_path / "mine"), "--out", str(tmp_path / "set"), "--workers", "1"]) == 0
     assert "1 takes to do" in capsys.readouterr().out
     about = json.loads((tmp_path / "set" / "set.json").read_text())

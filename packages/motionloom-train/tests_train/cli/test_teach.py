@@ -57,9 +57,9 @@ def test_check_says_what_is_wrong_and_writes_nothing(knowing: str, capsys: pytes
     io.save(motion_from_positions(people.standing(2.0), people.FPS), "clips/still.bvh")
     before = sorted(Path().rglob("*"))
     assert teach(knowing, "a zombie", "clips", "--check") == 2
-    said = capsys.readouterr().out
-    assert "wrong: nothing moves" in said
-    assert "2 of 3 clips can be learned from" in said
+    output = capsys.readouterr().out
+    assert "wrong: nothing moves" in output
+    assert "2 of 3 clips can be learned from" in output
     assert sorted(Path().rglob("*")) == before
     assert teach(knowing, "a zombie", "clips/one.bvh", "--check", "--json") == 0
     assert json.loads(capsys.readouterr().out)["usable"] == 1

@@ -37,9 +37,9 @@ from tests.work import ends
     ],
 )
 def test_captions_name_the_action_that_people_read_in_them(captions: tuple[str, ...], name: str) -> None:
-    found = action_of(captions)
-    assert found is not None
-    assert found.name == name
+    action = action_of(captions)
+    assert action is not None
+    assert action.name == name
 
 
 @pytest.mark.parametrize(
@@ -141,19 +141,19 @@ def test_the_core_of_somebody_who_never_changes_is_everything() -> None:
 
 def test_kicks_on_the_hands_are_no_kicks() -> None:
     for name in ("cmu_85_05", "cmu_85_06", "cmu_85_07"):
-        found = action_of(["kicks"], name)
-        assert found is not None
-        assert found.name == "breakdance"
+        action = action_of(["kicks"], name)
+        assert action is not None
+        assert action.name == "breakdance"
     assert action_of(["a person does a twisting jump"], "cmu_85_01") == ACTIONS["twisting jump"]
 
 
 def test_the_name_of_a_recording_overrules_its_captions() -> None:
     captions = ("a person grabbed something and moved backwards",)
     assert action_of(captions) is None
-    found = action_of(captions, "accad_Male2_E10_BodyHookRight")
-    assert found is not None
-    assert found.name == "punch"
-    assert all("right" in text or "left" not in text for text in sentences(found, side="right"))
+    action = action_of(captions, "accad_Male2_E10_BodyHookRight")
+    assert action is not None
+    assert action.name == "punch"
+    assert all("right" in text or "left" not in text for text in sentences(action, side="right"))
 
 
 @pytest.mark.parametrize("hand", [20, 21])

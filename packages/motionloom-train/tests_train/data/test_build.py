@@ -22,19 +22,21 @@ from motionloom_train.data.derived import mixed_clips
 from motionloom_train.data.sets import load_set, read_clips
 from motionloom_train.data.sources import BANDAI_LICENCE, CMU_LICENCE, UNKNOWN_LICENCE, Take, find_takes
 from tests.kinematics import people
-from tests_train.data import people as made
+from tests_train.data import people as recordings
 
 
 @pytest.fixture(scope="module")
 def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two training clips, one for validation, one too short, one that is no BVH."""
     clips = {
-        "go": (made.walker(), "train", "walk, veer left"),
-        "back": (made.walker(-1.0), "train", ""),
-        "kept": (made.walker(0.9), "val", "walk"),
-        "blink": (made.walker(seconds=0.6), "train", ""),
+        "go": (recordings.walker(), "train", "walk, veer left"),
+        "back": (recordings.walker(-1.0), "train", ""),
+        "kept": (recordings.walker(0.9), "val", "walk"),
+        "blink": (recordings.walker(seconds=0.6), "train", ""),
     }
-    folder = made.write_pack(tmp_path_factory.mktemp("pack") / "pack", clips, {"go": "a person walks to the left"})
+    folder = recordings.write_pack(
+        tmp_path_factory.mktemp("pack") / "pack", clips, {"go": "a person walks to the left"}
+    )
     (folder / "bvh" / "broken.bvh").write_bytes(b"HIERARCHY\nROOT")
     with open(folder / "manifest.csv", "a") as file:
         file.write("bvh/broken.bvh,cmu,broken,20,1.0,train,,1.0\n")
@@ -43,10 +45,10 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def built(pack: Path) -> tuple[Path, list[str]]:
-    said: list[str] = []
+    lines: list[str] = []
     out = pack.parent / "set"
-    build([pack], out, workers=1, mixed=0, progress=said.append)
-    return out, said
+    build([pack], out, workers=1, mixed=0, progress=lines.append)
+    return out, lines
 
 
 def by_name(folder: Path) -> dict[str, Clip]:
@@ -54,12 +56,12 @@ def by_name(folder: Path) -> dict[str, Clip]:
 
 
 def test_every_take_is_there_or_dropped_with_a_reason(built: tuple[Path, list[str]]) -> None:
-    out, said = built
+    out, lines = built
     assert {"go", "Mgo", "back", "Mback", "kept", "Mkept"} <= by_name(out).keys()
     dropped = json.loads((out / "set.json").read_text())["dropped"]
     assert set(dropped) == {"blink", "broken"}
     assert "0.6" in dropped["blink"]
-    assert {line.split(":")[0] for line in said if line.startswith("dropped")} == {"dropped blink", "dropped broken"}
+    assert {line.split(":")[0] for line in lines if line.startswith("dropped")} == {"dropped blink", "dropped broken"}
 
 
 def test_only_training_clips_are_multiplied(built: tuple[Path, list[str]]) -> None:
@@ -73,15 +75,15 @@ def test_only_training_clips_are_multiplied(built: tuple[Path, list[str]]) -> No
 def test_captions_and_labels_are_those_of_the_clip_and_are_mirrored(built: tuple[Path, list[str]]) -> None:
     clips = by_name(built[0])
 
-    def said(name: str) -> dict[str, tuple[str, ...]]:
+    def texts(name: str) -> dict[str, tuple[str, ...]]:
         return {note.kind: note.texts for note in clips[name].notes}
 
-    assert said("go")["human"] == ("a person walks to the left",)
-    assert said("Mgo")["human"] == ("a person walks to the right",)
-    assert any("left" in text for text in said("go")["index"])
-    assert "walk" in said("go")
-    assert "walk backward" in said("back")
-    assert "walk backward" in said("go_reversed")
+    assert texts("go")["human"] == ("a person walks to the left",)
+    assert texts("Mgo")["human"] == ("a person walks to the right",)
+    assert any("left" in text for text in texts("go")["index"])
+    assert "walk" in texts("go")
+    assert "walk backward" in texts("back")
+    assert "walk backward" in texts("go_reversed")
 
 
 def test_features_are_those_of_the_recording(built: tuple[Path, list[str]]) -> None:
@@ -100,10 +102,10 @@ def test_mean_and_std_are_of_the_training_split(built: tuple[Path, list[str]]) -
 
 
 def test_a_second_run_has_nothing_to_do(built: tuple[Path, list[str]], pack: Path) -> None:
-    out, said = built[0], []
+    out, lines = built[0], []
     before = {p: p.stat().st_mtime_ns for p in (out / "clips").iterdir()}
-    build([pack], out, workers=1, mixed=0, progress=said.append)
-    assert said[0] == "0 takes to do, 5 already done"
+    build([pack], out, workers=1, mixed=0, progress=lines.append)
+    assert lines[0] == "0 takes to do, 5 already done"
     assert {p: p.stat().st_mtime_ns for p in (out / "clips").iterdir()} == before
 
 
@@ -233,7 +235,7 @@ def test_mixed_clips_wear_the_arms_of_one_licence() -> None:
     ids=str,
 )
 def test_manifests_that_lead_astray_are_refused(tmp_path: Path, row: tuple, reason: str) -> None:
-    made.write_manifest(tmp_path, [row])
+    recordings.write_manifest(tmp_path, [row])
     with pytest.raises(MotionloomError, match=reason):
         build([tmp_path], tmp_path / "set", workers=1, progress=lambda line: None)
     assert not (tmp_path / "set").exists()
@@ -242,7 +244,7 @@ def test_manifests_that_lead_astray_are_refused(tmp_path: Path, row: tuple, reas
 def test_a_licence_is_never_made_up(tmp_path: Path) -> None:
     """Only sources called cmu or bandai get those licences; a manifest may state its own."""
     rows = [(f"{n}.bvh", n, n, 20, 1, "train", "", 1.0) for n in ("cmu-x", "bandai-1", "mine")]
-    made.write_manifest(tmp_path, rows)
+    recordings.write_manifest(tmp_path, rows)
     assert [t.licence for t in find_takes(tmp_path)] == [CMU_LICENCE, BANDAI_LICENCE, UNKNOWN_LICENCE]
     text = (tmp_path / "manifest.csv").read_text().splitlines()
     (tmp_path / "manifest.csv").write_text("\n".join([text[0] + ",licence", *(line + ",CC0" for line in text[1:])]))
@@ -337,10 +339,10 @@ def test_folders_with_nothing_in_them_are_refused(tmp_path: Path) -> None:
 
 def test_the_same_name_twice_is_reported(tmp_path: Path) -> None:
     for part in ("a", "b"):
-        made.write_bvh(tmp_path / part / "same.bvh", made.walker(seconds=2.0))
-    said: list[str] = []
-    build([tmp_path / "a", tmp_path / "b"], tmp_path / "set", workers=1, mixed=0, progress=said.append)
-    assert any("second same" in line for line in said)
+        recordings.write_bvh(tmp_path / part / "same.bvh", recordings.walker(seconds=2.0))
+    lines: list[str] = []
+    build([tmp_path / "a", tmp_path / "b"], tmp_path / "set", workers=1, mixed=0, progress=lines.append)
+    assert any("second same" in line for line in lines)
 
 
 def die(job: building.Job) -> None:

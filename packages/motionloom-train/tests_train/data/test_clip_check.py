@@ -17,8 +17,8 @@ def motion(positions: np.ndarray) -> Motion:
     return motion_from_positions(positions, people.FPS)
 
 
-def said(found: Motion) -> list[tuple[str, bool]]:
-    return [(finding.sentence, finding.fatal) for finding in check_clip(found)]
+def findings(motion: Motion) -> list[tuple[str, bool]]:
+    return [(finding.sentence, finding.fatal) for finding in check_clip(motion)]
 
 
 def walk() -> Motion:
@@ -26,32 +26,32 @@ def walk() -> Motion:
 
 
 def test_a_good_clip_has_no_fatal_fault() -> None:
-    assert not [sentence for sentence, fatal in said(walk()) if fatal]
-    assert said(motion(people.jumping(0.3))) == []
+    assert not [sentence for sentence, fatal in findings(walk()) if fatal]
+    assert findings(motion(people.jumping(0.3))) == []
 
 
-def scaled(found: Motion, factor: float) -> Motion:
-    skeleton = found.skeleton
+def scaled(motion: Motion, factor: float) -> Motion:
+    skeleton = motion.skeleton
     larger = Skeleton(skeleton.names, skeleton.parents, np.asarray(skeleton.offsets) * factor)
-    return replace(found, skeleton=larger, root=found.root * factor)
+    return replace(motion, skeleton=larger, root=motion.root * factor)
 
 
 @pytest.mark.parametrize(("factor", "advice"), [(100.0, "0.01 times"), (1000.0, "0.001 times"), (0.01, "100 times")])
 def test_a_wrong_unit_is_found(factor: float, advice: str) -> None:
-    (sentence, fatal), *_ = said(scaled(walk(), factor))
+    (sentence, fatal), *_ = findings(scaled(walk(), factor))
     assert fatal
     assert "unit of length is wrong" in sentence
     assert advice in sentence
 
 
 def test_a_short_clip_is_found() -> None:
-    (sentence, fatal), *_ = said(motion(people.walking(1.2, 0.6)))
+    (sentence, fatal), *_ = findings(motion(people.walking(1.2, 0.6)))
     assert fatal
     assert "s short" in sentence
 
 
 def test_a_still_clip_is_found() -> None:
-    (sentence, fatal), *_ = said(motion(people.standing(3.0)))
+    (sentence, fatal), *_ = findings(motion(people.standing(3.0)))
     assert fatal
     assert "nothing moves" in sentence
 
@@ -59,7 +59,7 @@ def test_a_still_clip_is_found() -> None:
 def test_a_leap_between_two_frames_is_found() -> None:
     positions = people.walking(1.2, 3.0)
     positions[30:, :, 0] += 3.0
-    (sentence, fatal), *_ = said(motion(positions))
+    (sentence, fatal), *_ = findings(motion(positions))
     assert fatal
     assert "leaps 3" in sentence
     assert "1.45 s" in sentence
@@ -68,19 +68,19 @@ def test_a_leap_between_two_frames_is_found() -> None:
 def test_somebody_who_floats_is_found() -> None:
     positions = people.walking(1.2, 4.0)
     positions[20:, :, 1] += 0.5
-    assert any("it floats" in sentence and not fatal for sentence, fatal in said(motion(positions)))
+    assert any("it floats" in sentence and not fatal for sentence, fatal in findings(motion(positions)))
 
 
 def test_a_floor_elsewhere_is_mentioned() -> None:
     positions = people.walking(1.2, 3.0)
     positions[..., 1] += 0.8
-    assert any("0.8" in sentence and "above y = 0" in sentence for sentence, _ in said(motion(positions)))
+    assert any("0.8" in sentence and "above y = 0" in sentence for sentence, _ in findings(motion(positions)))
 
 
 def test_feet_that_slide_are_found() -> None:
     positions = people.standing(3.0)
     positions[..., 2] += np.linspace(0, 3, len(positions))[:, None]
-    assert any("feet slide" in sentence and not fatal for sentence, fatal in said(motion(positions)))
+    assert any("feet slide" in sentence and not fatal for sentence, fatal in findings(motion(positions)))
 
 
 def test_what_cannot_be_read_is_a_fault() -> None:

@@ -18,8 +18,8 @@ def clip(positions: np.ndarray, *notes: Note) -> Clip:
     return Clip("a", "s", "free", "train", "plain", notes, features)
 
 
-def places(made: Clip) -> np.ndarray:
-    return hml.decode_positions(made.features.astype(np.float64))
+def places(longer: Clip) -> np.ndarray:
+    return hml.decode_positions(longer.features.astype(np.float64))
 
 
 def laid(face: float) -> np.ndarray:
@@ -32,17 +32,17 @@ def laid(face: float) -> np.ndarray:
 
 
 def test_who_has_lain_down_on_the_back_is_seen_to_lie() -> None:
-    said = Note(0, 59, "action:lie down", ("a person lies down",), (0, 59))
-    back = [n for made in held_clips([clip(laid(1.0), said)], NOBODY) for n in made.notes]
+    note = Note(0, 59, "action:lie down", ("a person lies down",), (0, 59))
+    back = [n for longer in held_clips([clip(laid(1.0), note)], NOBODY) for n in longer.notes]
     assert [n.kind for n in back if n.kind == "action:lie"] == ["action:lie"]
     (lies,) = (n for n in back if n.kind == "action:lie")
     assert lies.last - lies.first >= 70
-    made = next(m for m in held_clips([clip(laid(1.0), said)], NOBODY) if len(m.notes) == 2)
-    shown = places(made)[lies.first : lies.last]
-    assert shown[:, 0, 1].max() < 0.4
-    assert all(map(faces_up, shown))
-    said = replace(said, texts=("a person lies down", "a person lies down on the back"))
-    face = [n for made in held_clips([clip(laid(-1.0), said)], NOBODY) for n in made.notes]
+    longer = next(m for m in held_clips([clip(laid(1.0), note)], NOBODY) if len(m.notes) == 2)
+    part = places(longer)[lies.first : lies.last]
+    assert part[:, 0, 1].max() < 0.4
+    assert all(map(faces_up, part))
+    note = replace(note, texts=("a person lies down", "a person lies down on the back"))
+    face = [n for longer in held_clips([clip(laid(-1.0), note)], NOBODY) for n in longer.notes]
     assert {n.kind for n in face} == {"action:lie down", "action:get up"}
     assert not any("the back" in text for n in face for text in n.texts)
     assert any("the back" in text for n in back for text in n.texts)
@@ -53,10 +53,10 @@ def test_a_seat_is_taken_and_left_within_one_window() -> None:
     down = 0.35 * np.clip(np.arange(len(p)) / 34, 0, 1)[:, None]
     above = [0, 1, 2, 3, 4, 5, 6, 9, *range(12, 22)]
     p[:, above, 1] -= down
-    (made,) = sat_and_risen([clip(p, Note(0, 39, "action:sit down", ("a person sits down",)))], 4)
-    (note,) = made.notes
+    (both,) = sat_and_risen([clip(p, Note(0, 39, "action:sit down", ("a person sits down",)))], 4)
+    (note,) = both.notes
     assert note.kind == "action:sit down and stand up"
-    height = places(made)[:, 0, 1]
+    height = places(both)[:, 0, 1]
     first, last = note.core or (0, 0)
     assert last - first <= 147
     assert height[first:last].min() < height[0] - 0.3
@@ -66,19 +66,19 @@ def test_a_seat_is_taken_and_left_within_one_window() -> None:
 
 def test_gestures_go_on_for_four_seconds() -> None:
     """Windows of standing last two and a half, in which hands hardly arrive before they leave again."""
-    stands = clip(people.standing(2.6), Note(0, 51, "stand"))
+    standing = clip(people.standing(2.6), Note(0, 51, "stand"))
     walks = clip(people.walking(1.2, 2.6), Note(0, 51, "walk"))
-    made = list(made_clips([stands, walks], 60, seed=1))
-    assert len(made) > 40
-    assert min(len(one.features) for one in made) >= 79
+    gestures = list(made_clips([standing, walks], 60, seed=1))
+    assert len(gestures) > 40
+    assert min(len(one.features) for one in gestures) >= 79
 
 
 def test_who_has_walked_up_and_stopped_greets() -> None:
     walks = people.walking(1.2, 3.0)
     stops = np.concatenate([walks, np.repeat(walks[-1:], 40, axis=0)])
     noted = clip(stops, Note(0, len(stops) - 1, "action:stop walking", ("he walks and stops",), (10, len(walks))))
-    made = list(made_clips([clip(people.standing(2.6), Note(0, 51, "stand")), noted], 200, seed=1))
-    behind = [one for one in made if one.notes[0].kind == "action:made behind a walk"]
+    gestures = list(made_clips([clip(people.standing(2.6), Note(0, 51, "stand")), noted], 200, seed=1))
+    behind = [one for one in gestures if one.notes[0].kind == "action:made behind a walk"]
     assert behind
     for one in behind:
         p, (note,) = places(one), one.notes
@@ -91,8 +91,8 @@ def test_who_has_walked_up_and_stopped_greets() -> None:
 
 def test_a_load_is_carried_from_the_first_frame_to_the_last() -> None:
     walks = clip(people.walking(1.2, 5.0), Note(0, 99, "walk"))
-    made = list(made_clips([clip(people.standing(2.6), Note(0, 51, "stand")), walks], 200, seed=1))
-    carries = [one for one in made if one.notes[0].kind == "action:made carry"]
+    gestures = list(made_clips([clip(people.standing(2.6), Note(0, 51, "stand")), walks], 200, seed=1))
+    carries = [one for one in gestures if one.notes[0].kind == "action:made carry"]
     assert carries
     for one in carries:
         p = places(one)

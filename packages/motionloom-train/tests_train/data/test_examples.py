@@ -113,7 +113,7 @@ def test_a_short_walk_goes_on() -> None:
     """A loop: the person goes on at 1.2 m/s for the ten seconds that a window may take."""
     example = make_examples(walk(3.0), CAPTIONED, mirror=False)[0]
     assert example.looped
-    assert example.shown == (0, LENGTH)
+    assert example.span == (0, LENGTH)
     way = hml.decode_positions(example.features.astype(np.float64))[:, 0]
     assert np.linalg.norm(way[-1] - way[0]) == pytest.approx(1.2 * LENGTH / 20, rel=0.1)
 
@@ -121,7 +121,7 @@ def test_a_short_walk_goes_on() -> None:
 def test_a_short_change_is_held_at_both_ends() -> None:
     """What was recorded is in the middle, and before and behind it nearly nothing moves."""
     example = make_examples(bend(), CAPTIONED, mirror=False)[0]
-    first, end = example.shown
+    first, end = example.span
     assert not example.looped
     assert end - first == 29  # 1.5 s are 30 frames, and features are one fewer
     assert (first, len(example.features) - end) == (LENGTH - 29, LENGTH - 29)

@@ -29,14 +29,14 @@ def folded(positions: np.ndarray) -> np.ndarray:
 
 def take(name: str) -> Take:
     own = hml.uniform(people.walking(1.2))
-    made = folded(own) if FOLDED[name] else own
+    body = folded(own) if FOLDED[name] else own
     return Take(
         name,
         name.split("_")[0],
         "CC0",
         "train",
         (Span(0.0, 4.0, ("a person walks",), "human"),),
-        lambda: Places(made, own, people.FPS),
+        lambda: Places(body, own, people.FPS),
     )
 
 
@@ -45,16 +45,16 @@ def find(folder: Path | str, *, captions: Path | str | None = None) -> list[Take
 
 
 def built(out: Path, **allow: str) -> tuple[dict, list[str]]:
-    said: list[str] = []
-    path = build([out.parent], out, workers=1, mixed=0, find=find, allow=allow, progress=said.append)
-    return json.loads(path.read_text()), said
+    lines: list[str] = []
+    path = build([out.parent], out, workers=1, mixed=0, find=find, allow=allow, progress=lines.append)
+    return json.loads(path.read_text()), lines
 
 
 def test_a_body_that_does_not_do_what_was_recorded_stays_out(tmp_path: Path) -> None:
-    about, said = built(tmp_path / "set")
+    about, lines = built(tmp_path / "set")
     assert set(about["dropped"]) == {"bent_1", "bent_2"}
     assert "trunk 40.0 degrees off" in about["dropped"]["bent_1"]
-    assert any(line.startswith("dropped bent_1: its body") for line in said)
+    assert any(line.startswith("dropped bent_1: its body") for line in lines)
     assert not list((tmp_path / "set" / "clips").glob("*bent_[12]*"))
     assert about["fidelity"]["bent"] | {"degrees": 0, "cm": 0, "cm by legs alone": 0} == {
         "clips": 0,
@@ -67,14 +67,14 @@ def test_a_body_that_does_not_do_what_was_recorded_stays_out(tmp_path: Path) -> 
     sound = about["fidelity"]["sound"]
     assert (sound["clips"], sound["refused"]) == (1, 0)
     assert sound["degrees"]["trunk"][0] < 1
-    assert "bent: 0 clips like their recordings; 2 refused" in said
+    assert "bent: 0 clips like their recordings; 2 refused" in lines
 
 
 def test_a_known_case_comes_in_by_name_and_its_reason_stands_in_the_set(tmp_path: Path) -> None:
     """Also into a set that had refused it: that take alone is done again."""
     built(tmp_path / "set")
-    about, said = built(tmp_path / "set", bent_1="the actor wore a corset")
-    assert said[0] == "1 takes to do, 2 already done"
+    about, lines = built(tmp_path / "set", bent_1="the actor wore a corset")
+    assert lines[0] == "1 takes to do, 2 already done"
     assert set(about["dropped"]) == {"bent_2"}
     assert about["allowed"]["bent_1"]["reason"] == "the actor wore a corset"
     assert any("trunk 40" in fault for fault in about["allowed"]["bent_1"]["faults"])

@@ -22,9 +22,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_has_a_row_for_each_clip_with_both_bodies_on_it(built: Path, tmp_path: Path) -> None:
     """Two of the folded source, refused ones too, and the one of the other; folded bodies differ, sound ones do not."""
-    said: list[str] = []
-    draw_look(built, [built.parent], tmp_path / "page.png", find=find, progress=said.append)
-    assert {line.split(": ")[1] for line in said} == {"bent_1", "bent_2", "sound"}
+    lines: list[str] = []
+    draw_look(built, [built.parent], tmp_path / "page.png", find=find, progress=lines.append)
+    assert {line.split(": ")[1] for line in lines} == {"bent_1", "bent_2", "sound"}
     page = Image.open(tmp_path / "page.png").convert("L")
     rows = page.height // 3
     differ = []

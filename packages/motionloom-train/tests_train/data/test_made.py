@@ -19,30 +19,30 @@ def lengths(positions: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", sorted(GESTURES))
 def test_a_gesture_moves_arms_only_and_keeps_bones(name: str) -> None:
     body = people.standing(4.0)
-    made = perform(body, GESTURES[name], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(0))
-    np.testing.assert_allclose(lengths(made), lengths(body), atol=1e-6)
+    motion = perform(body, GESTURES[name], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(0))
+    np.testing.assert_allclose(lengths(motion), lengths(body), atol=1e-6)
     arms = [18, 19, 20, 21]
     rest = [
         j for j in range(22) if j not in arms and not (GESTURES[name].thrust[2] and j >= 9)
     ]  # a strike turns the chest
-    np.testing.assert_array_equal(made[:, rest], body[:, rest])
-    assert np.abs(made[:, arms] - body[:, arms]).max() > 0.1
-    step = np.linalg.norm(np.diff(made, axis=0), axis=-1).max()
+    np.testing.assert_array_equal(motion[:, rest], body[:, rest])
+    assert np.abs(motion[:, arms] - body[:, arms]).max() > 0.1
+    step = np.linalg.norm(np.diff(motion, axis=0), axis=-1).max()
     assert step * 20 < 6  # metres a second: no joint jumps
 
 
 def test_claps_bring_the_wrists_together_again_and_again() -> None:
-    made = perform(people.standing(6.0), GESTURES["clap"], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(1))
-    gap = np.linalg.norm(made[:, 20] - made[:, 21], axis=-1)
+    motion = perform(people.standing(6.0), GESTURES["clap"], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(1))
+    gap = np.linalg.norm(motion[:, 20] - motion[:, 21], axis=-1)
     near = gap[30:-30] < 0.12
     assert np.count_nonzero(np.diff(near.astype(int)) == 1) >= 3
 
 
 def test_a_hand_of_one_side_leaves_the_other_alone() -> None:
     body = people.standing(3.0)
-    made = perform(body, GESTURES["salute"], "right", fps=20.0, begin=0.5, rng=np.random.default_rng(2))
-    np.testing.assert_array_equal(made[:, [18, 20]], body[:, [18, 20]])
-    assert made[:, 21, 1].max() > body[:, 12, 1].max()
+    motion = perform(body, GESTURES["salute"], "right", fps=20.0, begin=0.5, rng=np.random.default_rng(2))
+    np.testing.assert_array_equal(motion[:, [18, 20]], body[:, [18, 20]])
+    assert motion[:, 21, 1].max() > body[:, 12, 1].max()
 
 
 def test_lowered_arms_hang_below_the_chest() -> None:
@@ -89,19 +89,19 @@ def test_clips_whose_poses_differ_are_not_joined() -> None:
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_punch_is_one_fast_thrust_of_its_hand(side: str) -> None:
-    made = perform(people.standing(4.0), GESTURES["punch"], side, fps=20.0, begin=0.7, rng=np.random.default_rng(3))
-    reach = np.linalg.norm(made[:, [20, 21]] - made[:, [16, 17]], axis=-1)
+    motion = perform(people.standing(4.0), GESTURES["punch"], side, fps=20.0, begin=0.7, rng=np.random.default_rng(3))
+    reach = np.linalg.norm(motion[:, [20, 21]] - motion[:, [16, 17]], axis=-1)
     speed = ph.velocity(reach, 20.0)[24:45]  # while the guard is held
     own, other = (0, 1) if side == "left" else (1, 0)
     assert speed[:, own].max() > 1.5 > 0.5 > speed[:, other].max()
-    forward = ph.in_body(made)[:, [20, 21], 2]
+    forward = ph.in_body(motion)[:, [20, 21], 2]
     assert forward[24:45, own].max() > forward[24:45, other].max() + 0.2
 
 
 @pytest.mark.parametrize(("name", "times"), [("arm up twice", 2), ("arm up three times", 3)])
 def test_an_arm_goes_up_as_often_as_the_words_say(name: str, times: int) -> None:
-    made = perform(people.standing(6.0), GESTURES[name], "right", fps=20.0, begin=0.7, rng=np.random.default_rng(4))
-    up = made[:, 21, 1] > made[:, 15, 1]
+    motion = perform(people.standing(6.0), GESTURES[name], "right", fps=20.0, begin=0.7, rng=np.random.default_rng(4))
+    up = motion[:, 21, 1] > motion[:, 15, 1]
     assert np.count_nonzero(np.diff(up.astype(int)) == 1) == times
     assert not up[-1]
 
@@ -115,6 +115,6 @@ def test_hands_rest_on_the_hips_of_somebody_who_bends_forward() -> None:
     body[:, above] = body[:, :1] + np.stack(
         [offset[..., 0], np.cos(lean)[:, None] * offset[..., 1], np.sin(lean)[:, None] * offset[..., 1]], axis=-1
     )
-    made = perform(body, GESTURES["hands on hips"], "", fps=20.0, begin=0.5, rng=np.random.default_rng(5))
-    waist = made[40:55, [1, 2]] + [0.0, 0.12, 0.0]
-    assert np.linalg.norm(made[40:55, [20, 21]] - waist, axis=-1).max() < 0.22
+    motion = perform(body, GESTURES["hands on hips"], "", fps=20.0, begin=0.5, rng=np.random.default_rng(5))
+    waist = motion[40:55, [1, 2]] + [0.0, 0.12, 0.0]
+    assert np.linalg.norm(motion[40:55, [20, 21]] - waist, axis=-1).max() < 0.22

@@ -49,8 +49,8 @@ def protocol(*recordings: Recording, **changes: object) -> Protocol:
 )
 def test_windows_start_every_observed_length(frames: int, strict: bool, starts: list[int]) -> None:
     """Counted by hand: 0, 4, 8 ... while start + 10 < frames, or <= where it is not strict."""
-    found = protocol(recording("a", frames), strict=strict).windows()
-    assert [start for _, start in found] == starts
+    windows = protocol(recording("a", frames), strict=strict).windows()
+    assert [start for _, start in windows] == starts
 
 
 def test_first_and_stride_move_the_windows() -> None:
@@ -94,7 +94,7 @@ def test_no_subject_and_no_pair_of_the_pack_is_in_two_splits() -> None:
     takes = [t for t in find_takes(folder) if t.source == "cmu"]
     for one in takes:
         splits.setdefault(one.name.split("_")[0], set()).add(cmu_split(one))
-    assert all(len(found) == 1 for found in splits.values())
+    assert all(len(parts) == 1 for parts in splits.values())
     assert set().union(*splits.values()) == {"train", "val", "test"}
     assert splits["60"] == splits["61"]  # the dancers
     assert set(CMU_TEST + CMU_VAL) <= set(splits)
@@ -123,8 +123,8 @@ def test_ten_files_of_ones_own_make_three_splits(tmp_path: Path) -> None:
     people.write_bvh(tmp_path / "clip0.bvh", people.walker(seconds=3.1))
     for number in (4, 9):
         (tmp_path / f"clip{number}.bvh").write_bytes((tmp_path / "clip0.bvh").read_bytes())
-    told: list[str] = []
-    read = read_folder(tmp_path, fps=20.0, say=told.append)
+    lines: list[str] = []
+    read = read_folder(tmp_path, fps=20.0, say=lines.append)
     assert {r.name: r.split for r in read.recordings} == {"clip0": "train", "clip4": "val", "clip9": "test"}
-    assert sum("left out clip" in line for line in told) == 7
+    assert sum("left out clip" in line for line in lines) == 7
     assert (read.observed, read.future, read.fps) == (20, 40, 20.0)

@@ -28,20 +28,20 @@ def kicking(folder: Path) -> Path:
     return folder
 
 
-def shown(batches: Batches, window: int) -> list[Item]:
+def items_of(batches: Batches, window: int) -> list[Item]:
     """The items that windows of so many frames are taken from."""
     return [batches.data.items[number] for number in batches._pools[window].numbers]
 
 
 def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -> None:
     batches = Batches(load_set(kicking(tmp_path / "set")), windows=(48,), shares=(1.0,))
-    assert {item.start for item in shown(batches, 48) if item.group == "human"} == {100}
+    assert {item.start for item in items_of(batches, 48) if item.group == "human"} == {100}
 
 
 def test_events_are_shown_whole_and_states_in_part(tmp_path: Path) -> None:
     batches = Batches(load_set(jumping(tmp_path / "set")), windows=(32, 48), shares=(0.5, 0.5))
-    assert {item.group for item in shown(batches, 32)} == {"walk"}
-    assert {item.start for item in shown(batches, 48)} == {0, 20, 100}
+    assert {item.group for item in items_of(batches, 32)} == {"walk"}
+    assert {item.start for item in items_of(batches, 48)} == {0, 20, 100}
     lengths = batches.draw(0, 1, 64).lengths
     np.testing.assert_array_equal(np.unique(lengths), [32] if lengths.max() == 32 else [48])
 
@@ -111,8 +111,8 @@ def test_a_change_longer_than_the_window_is_not_shown(tmp_path: Path) -> None:
     note = Note(0, 190, "action:sit down", ("a person sits down",), (10, 120))
     data = load_set(described(tmp_path / "set", note, Note(0, 190, "walk")))
     batches = Batches(data, windows=(48, 120), shares=(0.5, 0.5))
-    assert {item.group for item in shown(batches, 48)} == {"walk"}
-    assert {item.group for item in shown(batches, 120)} == {"walk", "action:sit down"}
+    assert {item.group for item in items_of(batches, 48)} == {"walk"}
+    assert {item.group for item in items_of(batches, 120)} == {"walk", "action:sit down"}
 
 
 def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_path: Path) -> None:
@@ -121,11 +121,11 @@ def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_p
     described(folder, Note(0, 100, "action:eat", ("an animated person eats",)), kind="keyed")
     described(folder, Note(0, 100, "action:nod", ("a person nods",)), kind="made")
     batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
-    said = np.array([batches.data.texts[i] for i in batches.draw(0, 0, 40_000).texts.tolist()])
+    texts = np.array([batches.data.texts[i] for i in batches.draw(0, 0, 40_000).texts.tolist()])
     nods = [batches.data.texts[i] for i in batches.data.items[-1].texts]
-    assert abs(np.isin(said, nods).mean() - 0.5) < 0.02
-    keyed = (said == "an animated person eats").sum() / np.isin(
-        said, ["an animated person eats", "a person eats"]
+    assert abs(np.isin(texts, nods).mean() - 0.5) < 0.02
+    keyed = (texts == "an animated person eats").sum() / np.isin(
+        texts, ["an animated person eats", "a person eats"]
     ).sum()
     assert abs(keyed - 0.4 / 9.4) < 0.03
 
@@ -140,13 +140,13 @@ def test_windows_of_a_climb_begin_on_the_floor(tmp_path: Path) -> None:
         folder = described(tmp_path / group, note)
         write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
         batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
-        shown = batches.draw(0, 0, 1).features * batches.data.std + batches.data.mean
-        places = hml.decode_positions(shown[0].numpy().astype(np.float64))
+        items_of = batches.draw(0, 0, 1).features * batches.data.std + batches.data.mean
+        places = hml.decode_positions(items_of[0].numpy().astype(np.float64))
         assert abs(places[0, :, 1].min() - lowest) < 0.05
         np.testing.assert_allclose(places[-1, 0, 1] - places[0, 0, 1], 47 * 5 / 199, atol=0.02)
 
 
-def said_of(folder: Path, note: Note) -> tuple[str, ...]:
+def texts_of(folder: Path, note: Note) -> tuple[str, ...]:
     """The sentences that the only item of a set is shown with."""
     data = load_set(described(folder, note))
     return tuple(data.texts[number] for number in data.items[0].texts)
@@ -154,16 +154,16 @@ def said_of(folder: Path, note: Note) -> tuple[str, ...]:
 
 def test_a_strike_without_a_side_in_words_is_one_of_the_right_hand(tmp_path: Path) -> None:
     """The average of a punch by either hand would be a guard."""
-    said = {
-        side: said_of(tmp_path / side, Note(0, 190, "action:made punch", (f"he punches with the {side} hand",)))
+    texts = {
+        side: texts_of(tmp_path / side, Note(0, 190, "action:made punch", (f"he punches with the {side} hand",)))
         for side in ("left", "right")
     }
-    assert len(said["left"]) > 5
-    assert all("left" in text for text in said["left"])
-    assert sum("right" not in text for text in said["right"]) > 5
+    assert len(texts["left"]) > 5
+    assert all("left" in text for text in texts["left"])
+    assert sum("right" not in text for text in texts["right"]) > 5
 
 
 def test_a_kick_by_nobody_knows_which_foot_keeps_all_its_words(tmp_path: Path) -> None:
-    said = said_of(tmp_path / "set", Note(0, 190, "action:kick", ("she kicks",)))
-    assert "she kicks" in said
-    assert len(said) > 5
+    texts = texts_of(tmp_path / "set", Note(0, 190, "action:kick", ("she kicks",)))
+    assert "she kicks" in texts
+    assert len(texts) > 5

@@ -45,8 +45,8 @@ def turning(degrees: float, seconds: float = 4.0) -> np.ndarray:
 )
 def test_paths_are_named(positions: np.ndarray, label: str | None) -> None:
     """A mirrored circle without exchanged limbs is no person: it only must not be called a circle to the left."""
-    found = label_window(positions, FPS, "")
-    assert label in found if label else "circle left" not in found
+    labels = label_window(positions, FPS, "")
+    assert label in labels if label else "circle left" not in labels
 
 
 def test_gestures_need_the_word_and_the_movement() -> None:
@@ -97,9 +97,9 @@ def test_who_goes_forward_meanwhile_takes_the_stairs(way: int, label: str) -> No
 def test_what_is_climbed_is_in_the_words(text: str, label: str) -> None:
     """Playgrounds and boxes are climbed with bent trunks and on hands; that is no way up the stairs."""
     up = people.walking(0.8, 4.0)[:80] + np.linspace(0, 1.2, 80)[:, None, None] * [0, 1, 0]
-    found = label_window(up, FPS, text)
-    assert label in found
-    assert ("climb stairs" in found) == (label == "climb stairs")
+    labels = label_window(up, FPS, text)
+    assert label in labels
+    assert ("climb stairs" in labels) == (label == "climb stairs")
 
 
 @pytest.mark.parametrize(("name", "label"), [("wave", True), ("wave both", False)])

@@ -80,9 +80,9 @@ def test_gerunds_of_verb_phrases(phrase: str, fragment: str) -> None:
 
 def test_a_sentence_has_a_subject_or_is_a_command_or_a_fragment() -> None:
     rng = np.random.default_rng(0)
-    made = {sentence("walks forward", rng) for _ in range(300)}
-    assert {"walk forward", "walking forward"} < made
-    rest = made - {"walk forward", "walking forward"}
+    sentences = {sentence("walks forward", rng) for _ in range(300)}
+    assert {"walk forward", "walking forward"} < sentences
+    rest = sentences - {"walk forward", "walking forward"}
     assert all(text.endswith((" walks forward", " is walking forward")) for text in rest)
     assert len(rest) > 5
 
@@ -98,9 +98,9 @@ def test_a_sentence_has_a_subject_or_is_a_command_or_a_fragment() -> None:
     ],
 )
 def test_index_descriptions_become_phrases(description: str, words: set[str]) -> None:
-    said = " ".join(describe_index(description))
-    assert said
-    assert any(word in said for word in words)
+    text = " ".join(describe_index(description))
+    assert text
+    assert any(word in text for word in words)
 
 
 def test_unknown_descriptions_say_nothing_and_styles_are_added() -> None:

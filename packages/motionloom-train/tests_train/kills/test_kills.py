@@ -18,7 +18,7 @@ from motionloom_train.data.clips import read_clip
 from tests.kills import programs
 from tests.kills.programs import SEED, ended_by, kills, moments, needs_signals, parts, run, uninterrupted
 from tests_train import runs
-from tests_train.data import people as made
+from tests_train.data import people
 
 pytestmark = needs_signals
 programs.PRELOADED += [build.__name__, runs.__name__]
@@ -33,12 +33,12 @@ def train(data: str, out: str, steps: str) -> None:
 @pytest.fixture(scope="module")
 def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
     clips = {
-        "go": (made.walker(seconds=2.0), "train", "walk"),
-        "back": (made.walker(-1.0, seconds=2.0), "train", ""),
-        "kept": (made.walker(0.9, seconds=2.0), "val", "walk"),
-        "blink": (made.walker(seconds=0.6), "train", ""),
+        "go": (people.walker(seconds=2.0), "train", "walk"),
+        "back": (people.walker(-1.0, seconds=2.0), "train", ""),
+        "kept": (people.walker(0.9, seconds=2.0), "val", "walk"),
+        "blink": (people.walker(seconds=0.6), "train", ""),
     }
-    return made.write_pack(tmp_path_factory.mktemp("pack") / "pack", clips, {"go": "a person walks"})
+    return people.write_pack(tmp_path_factory.mktemp("pack") / "pack", clips, {"go": "a person walks"})
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
@@ -78,8 +78,8 @@ def test_training_goes_on_bit_for_bit(tmp_path: Path) -> None:
         for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL):
             ended = run(words, folder, at=int(rng.integers(1, whole.marks)), number=number)
             assert ended.code in (0, 130, -signal.SIGKILL), ended
-            seen = dict(line.split() for line in ended.out.splitlines() if len(line.split()) == 2)
-            assert seen.items() <= right.items()
+            losses = dict(line.split() for line in ended.out.splitlines() if len(line.split()) == 2)
+            assert losses.items() <= right.items()
         ended = run(words, folder)
         assert ended.code == 0, ended.said
         assert _content((folder / "run" / "state.safetensors").read_bytes()) == _content(state)

@@ -23,7 +23,7 @@ def awake(config: PredictorConfig, seed: int = 0) -> TransLinear:
     return net.eval().requires_grad_(False)
 
 
-def given(config: PredictorConfig, rows: int = 3) -> tuple[Tensor, Tensor, Tensor]:
+def inputs(config: PredictorConfig, rows: int = 3) -> tuple[Tensor, Tensor, Tensor]:
     generator = torch.Generator().manual_seed(5)
     x = torch.randn(rows, config.kept, config.channels, generator=generator)
     return x, torch.arange(1, rows + 1) * 100, torch.randn(rows, *config.condition_shape, generator=generator)
@@ -45,8 +45,8 @@ def test_published_sizes(config: PredictorConfig, parameters: int, tensors: int)
 def test_a_new_network_says_nothing_so_its_first_loss_is_one(config: PredictorConfig) -> None:
     """E[eps^2] = 1 for noise eps."""
     net = TransLinear(config).eval()
-    x, t, told = given(config)
-    assert torch.equal(net(x, t, told), torch.zeros_like(x))
+    x, t, condition = inputs(config)
+    assert torch.equal(net(x, t, condition), torch.zeros_like(x))
     noise = torch.randn(400, 5, 6, generator=torch.Generator().manual_seed(1))
     loss = (net(noise, torch.ones(400, dtype=torch.long)) - noise).square().mean()
     assert float(loss.detach()) == pytest.approx(1, abs=4 * (2 / noise.numel()) ** 0.5)
@@ -67,35 +67,35 @@ def test_odd_layers_are_refused_in_words(layers: int) -> None:
 
 @pytest.mark.parametrize("config", [SMALL, BESIDE], ids=["published", "beside"])
 def test_rows_do_not_see_each_other(config: PredictorConfig) -> None:
-    net, (x, t, told) = awake(config), given(config)
-    together = net(x, t, told)
-    alone = torch.cat([net(x[i : i + 1], t[i : i + 1], told[i : i + 1]) for i in range(3)])
+    net, (x, t, condition) = awake(config), inputs(config)
+    together = net(x, t, condition)
+    alone = torch.cat([net(x[i : i + 1], t[i : i + 1], condition[i : i + 1]) for i in range(3)])
     torch.testing.assert_close(together, alone, atol=1e-5, rtol=1e-5)
     assert not torch.allclose(together[0], together[1], atol=1e-2)
 
 
 @pytest.mark.parametrize("config", [SMALL, BESIDE], ids=["published", "beside"])
 def test_rows_that_are_not_told_are_as_with_nothing_to_tell(config: PredictorConfig) -> None:
-    net, (x, t, told) = awake(config), given(config)
-    mixed = net(x, t, told, torch.tensor([True, False, True]))
+    net, (x, t, condition) = awake(config), inputs(config)
+    mixed = net(x, t, condition, torch.tensor([True, False, True]))
     torch.testing.assert_close(mixed[1], net(x, t)[1])
-    torch.testing.assert_close(mixed[::2], net(x, t, told)[::2])
+    torch.testing.assert_close(mixed[::2], net(x, t, condition)[::2])
     assert not torch.allclose(mixed[0], net(x, t)[0], atol=1e-2)
 
 
 def test_nothing_told_is_not_zeros_told() -> None:
     """The bias of the condition's layer is absent too."""
-    net, (x, t, told) = awake(SMALL), given(SMALL)
-    assert not torch.allclose(net(x, t), net(x, t, torch.zeros_like(told)), atol=1e-3)
+    net, (x, t, condition) = awake(SMALL), inputs(SMALL)
+    assert not torch.allclose(net(x, t), net(x, t, torch.zeros_like(condition)), atol=1e-3)
 
 
-def naive(net: TransLinear, x: Tensor, t: Tensor, told: Tensor) -> Tensor:
+def naive(net: TransLinear, x: Tensor, t: Tensor, condition: Tensor) -> Tensor:
     """The published network again, head by head, the skips written as the paper's figure has them."""
     w = net.state_dict()
 
     def linear(v: Tensor, name: str) -> Tensor:
-        made = v @ w[f"{name}.weight"].T
-        return made + w[f"{name}.bias"] if f"{name}.bias" in w else made
+        waves_ = v @ w[f"{name}.weight"].T
+        return waves_ + w[f"{name}.bias"] if f"{name}.bias" in w else waves_
 
     def norm(v: Tensor, name: str) -> Tensor:
         v = v - v.mean(-1, keepdim=True)
@@ -123,7 +123,7 @@ def naive(net: TransLinear, x: Tensor, t: Tensor, told: Tensor) -> Tensor:
         return h + stylised(linear(inner, f"{at}.ffn.linear2"), emb, f"{at}.ffn.proj_out")
 
     emb = linear(silu(linear(waves(t, net.config.width), "time_embed.0")), "time_embed.2")
-    emb = emb + linear(told.reshape(len(told), -1), "cond_embed")
+    emb = emb + linear(condition.reshape(len(condition), -1), "cond_embed")
     in0 = linear(x, "joint_embed") + w["sequence_embedding"]
     in1 = block(in0, emb, 0)
     out2 = block(block(in1, emb, 1), emb, 2) + in1
@@ -131,23 +131,23 @@ def naive(net: TransLinear, x: Tensor, t: Tensor, told: Tensor) -> Tensor:
 
 
 def test_four_layers_are_the_published_ones_written_out() -> None:
-    net, (x, t, told) = awake(SMALL), given(SMALL)
-    torch.testing.assert_close(net(x, t, told), naive(net, x, t, told), atol=1e-4, rtol=1e-4)
+    net, (x, t, condition) = awake(SMALL), inputs(SMALL)
+    torch.testing.assert_close(net(x, t, condition), naive(net, x, t, condition), atol=1e-4, rtol=1e-4)
 
 
 def test_time_waves_are_cosines_then_sines_of_falling_frequency() -> None:
-    made = waves(torch.tensor([500]), 512)[0]
-    assert made[:4].tolist() == pytest.approx([-0.883849, 0.096189, 0.945946, -0.919424], abs=1e-4)
-    assert made[256:260].tolist() == pytest.approx([-0.467772, -0.995363, 0.324325, 0.393267], abs=1e-4)
+    waves_ = waves(torch.tensor([500]), 512)[0]
+    assert waves_[:4].tolist() == pytest.approx([-0.883849, 0.096189, 0.945946, -0.919424], abs=1e-4)
+    assert waves_[256:260].tolist() == pytest.approx([-0.467772, -0.995363, 0.324325, 0.393267], abs=1e-4)
 
 
 def test_beside_every_token_sees_its_own_row() -> None:
     """With the condition's own layer silent, a row of what is told still matters, the last (tokenless) one not."""
-    net, (x, t, told) = awake(BESIDE), given(BESIDE)
+    net, (x, t, condition) = awake(BESIDE), inputs(BESIDE)
     with torch.no_grad():
         net.cond_embed.weight.zero_()
-    before = net(x, t, told)
-    row, last = told.clone(), told.clone()
+    before = net(x, t, condition)
+    row, last = condition.clone(), condition.clone()
     row[:, 2] += 1
     last[:, -1] += 1
     assert not torch.allclose(before, net(x, t, row), atol=1e-3)

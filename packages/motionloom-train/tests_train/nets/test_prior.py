@@ -20,7 +20,7 @@ BOTH = pytest.mark.parametrize(
 CLOSE = {"rtol": 0, "atol": 2e-5}
 
 
-def said(rows: int, *, words: int = 5, seed: int = 1, lengths: list[int] | None = None) -> Condition:
+def random_condition(rows: int, *, words: int = 5, seed: int = 1, lengths: list[int] | None = None) -> Condition:
     """Random text vectors, the last word of odd rows missing."""
     generator = torch.Generator().manual_seed(seed)
     width = tiny.MODULATED.text
@@ -46,8 +46,8 @@ def test_valid_frames_do_not_depend_on_padding(config: NetConfig, frames: int, m
     """Neither on what stands in the padded frames nor on how many there are, whatever the length is."""
     net, x = tiny_net(config), noise(1, frames)
     padded = torch.cat([x, torch.full((1, more, 263), fill)], dim=1)
-    alone = run(net, x, said(1))
-    torch.testing.assert_close(run(net, padded, said(1, lengths=[frames]))[:, :frames], alone, **CLOSE)
+    alone = run(net, x, random_condition(1))
+    torch.testing.assert_close(run(net, padded, random_condition(1, lengths=[frames]))[:, :frames], alone, **CLOSE)
 
 
 @BOTH
@@ -56,13 +56,13 @@ def test_without_lengths_every_frame_is_heard(config: NetConfig) -> None:
     net, x = tiny_net(config), noise(1, 9)
     changed = x.clone()
     changed[:, -1] += 3
-    assert (run(net, x, said(1)) - run(net, changed, said(1)))[:, 0].abs().max() > 1e-3
+    assert (run(net, x, random_condition(1)) - run(net, changed, random_condition(1)))[:, 0].abs().max() > 1e-3
 
 
 @BOTH
 def test_rows_are_independent(config: NetConfig) -> None:
     """A row in a batch with other texts, levels and lengths is what it is alone."""
-    net, x, cond = tiny_net(config), noise(4, 10), said(4, lengths=[10, 3, 7, -1])
+    net, x, cond = tiny_net(config), noise(4, 10), random_condition(4, lengths=[10, 3, 7, -1])
     levels = torch.tensor([1, 5, 30, 50])
     together = run(net, x, cond, levels)
     for row in range(4):
@@ -78,7 +78,7 @@ def test_a_clock_tells_time_and_text_without_the_noise() -> None:
     fresh = PriorNet(CLOCKED).eval()
     missing = fresh.load_state_dict(plain.state_dict(), strict=False).missing_keys
     assert {key.split(".")[0] for key in missing} == {"place", "clock"}
-    x, cond = noise(2, 12), said(2)
+    x, cond = noise(2, 12), random_condition(2)
     assert torch.equal(run(fresh, x, cond), run(plain, x, cond))
     net = tiny_net(CLOCKED)
     with torch.inference_mode():
@@ -92,7 +92,7 @@ def test_a_clock_tells_time_and_text_without_the_noise() -> None:
 @BOTH
 def test_bound_once_is_bound_every_time(config: NetConfig) -> None:
     """Binding depends on the condition alone, and rows of bound parts may be chosen."""
-    net, x, cond = tiny_net(config), noise(3, 8), said(3)
+    net, x, cond = tiny_net(config), noise(3, 8), random_condition(3)
     with torch.inference_mode():
         once = net.bind(cond)
         for level in (50, 3, 1):
@@ -104,34 +104,34 @@ def test_bound_once_is_bound_every_time(config: NetConfig) -> None:
 @BOTH
 @pytest.mark.parametrize("frames", [1, 3, 4, 5, 13])
 def test_any_count_of_frames_keeps_its_shape(config: NetConfig, frames: int) -> None:
-    assert run(tiny_net(config), noise(2, frames), said(2)).shape == (2, frames, 263)
+    assert run(tiny_net(config), noise(2, frames), random_condition(2)).shape == (2, frames, 263)
 
 
 def test_the_null_text_of_the_published_manner_is_the_bias() -> None:
     """Unconditional input is the zero text vector, so what reaches the network is the bias of the text layer."""
     net = tiny_net(tiny.PUBLISHED)
-    torch.testing.assert_close(net.bind(said(2).null()).text, net.text.bias.expand(2, -1), rtol=0, atol=0)
+    torch.testing.assert_close(net.bind(random_condition(2).null()).text, net.text.bias.expand(2, -1), rtol=0, atol=0)
 
 
 @BOTH
 def test_the_null_condition_forgets_the_text(config: NetConfig) -> None:
     """Two texts give two guesses, and one guess once they are taken away."""
     net, x = tiny_net(config), noise(2, 8)
-    one, other = said(2, seed=1), said(2, seed=9)
+    one, other = random_condition(2, seed=1), random_condition(2, seed=9)
     assert (run(net, x, one) - run(net, x, other)).abs().max() > 1e-3
     torch.testing.assert_close(run(net, x, one.null()), run(net, x, other.null()), rtol=0, atol=0)
 
 
 @BOTH
 def test_dropped_text_is_the_null_condition_in_its_rows(config: NetConfig) -> None:
-    net, x, cond = tiny_net(config), noise(2, 8), said(2)
+    net, x, cond = tiny_net(config), noise(2, 8), random_condition(2)
     some = run(net, x, cond.choose(torch.tensor([True, False])))
     torch.testing.assert_close(some[0], run(net, x, cond)[0], **CLOSE)
     torch.testing.assert_close(some[1], run(net, x, cond.null())[1], **CLOSE)
 
 
 def test_words_behind_the_mask_are_not_heard() -> None:
-    net, x, cond = tiny_net(), noise(2, 8), said(2)
+    net, x, cond = tiny_net(), noise(2, 8), random_condition(2)
     tokens = cond.tokens.clone()
     tokens[~cond.words] = 1e3
     torch.testing.assert_close(run(net, x, cond._replace(tokens=tokens)), run(net, x, cond), **CLOSE)
@@ -144,7 +144,7 @@ def test_a_network_that_reads_words_says_so() -> None:
 
 def test_transition_flags_are_heard_and_zero_by_default() -> None:
     net, x = tiny_net(replace(tiny.PUBLISHED, flags=True)), noise(1, 6)
-    pooled = said(1).pooled
+    pooled = random_condition(1).pooled
     plain = run(net, x, condition(pooled))
     torch.testing.assert_close(run(net, x, condition(pooled, flags=torch.zeros(1, 6, dtype=torch.long))), plain)
     assert (run(net, x, condition(pooled, flags=torch.ones(1, 6, dtype=torch.long))) - plain).abs().max() > 1e-4

@@ -1,6 +1,6 @@
 """`motionloom bench`: speed as ratios within one run, so that they mean the same on any machine.
 
-Times are medians of interleaved repeats. Nothing here is a test: a busy machine makes it slower, not wrong.
+Times are medians of interleaved repeats. Nothing here is a test: on a busy machine it is slower, not wrong.
 `speed` has the tools, what `generate` costs and what whole processes take, `long` what `compose` costs, `prediction`
 what futures cost.
 """
@@ -61,20 +61,20 @@ def bench(
         lambda: commands(weights, repeats=min(repeats, 3), run=run),
         lambda: starts(weights, repeats=repeats, run=run),
     ]
-    found: dict[str, Any] = {"machine": about, "quick": quick, "entries": []}
+    results: dict[str, Any] = {"machine": about, "quick": quick, "entries": []}
 
     def keep(entries: list[Entry]) -> None:
         for entry in entries:
-            found["entries"].append(asdict(entry))
+            results["entries"].append(asdict(entry))
             progress(f"{entry.name}: {entry.value:.3g} {entry.unit}")
 
     for part in parts if what != "long" else []:
         keep(part())
     if what != "short":
         measured = long_motion(prior, how, QUICK if quick else FULL, weights=weights, run=run, progress=progress)
-        found["long"] = asdict(measured)
+        results["long"] = asdict(measured)
         keep(entries_of(measured))
-    return found
+    return results
 
 
 def bench_prediction(predictor: Predictor, *, quick: bool = False, progress: Say = silent) -> dict[str, Any]:
@@ -98,10 +98,10 @@ def machine(prior: Prior | Predictor) -> dict[str, Any]:
     }
 
 
-def table(found: dict[str, Any]) -> list[list[str]]:
+def table(results: dict[str, Any]) -> list[list[str]]:
     """Rows of text, the heading first."""
     rows = [["what", "measured", "", "target", "", "how"]]
-    for entry in found["entries"]:
+    for entry in results["entries"]:
         verdict = "ok" if entry["passes"] else "MISSED"
         rows.append([entry["name"], f"{entry['value']:.3g}", entry["unit"], entry["target"], verdict, entry["note"]])
     return rows

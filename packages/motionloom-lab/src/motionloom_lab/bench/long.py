@@ -141,8 +141,8 @@ def long_motion(
         "published_mode": "published",
         "published_handshake": HANDSHAKE,
     }
-    done = takes(first / course.steps, second / course.steps)
-    return Measured(course.lengths, tuple(times), tuple(peaks), done, settings)
+    published = takes(first / course.steps, second / course.steps)
+    return Measured(course.lengths, tuple(times), tuple(peaks), published, settings)
 
 
 def _making(prior: Prior, how: Sampling, texts: Sequence[str], each: float, out: Path) -> Callable[[], None]:
@@ -205,15 +205,15 @@ def in_two_calls(prior: Prior, bound: Bound, null: Bound, scale: float) -> Denoi
     return denoise
 
 
-def entries_of(found: Measured) -> list[Entry]:
+def entries_of(costs: Measured) -> list[Entry]:
     """The numbers against their targets."""
-    return [_straight(found), _memory(found), _against_published(found)]
+    return [_straight(costs), _memory(costs), _against_published(costs)]
 
 
-def _straight(found: Measured) -> Entry:
-    slope, start, r2 = fit(found.lengths, found.times)
-    off = 100 * max(abs(t / (start + slope * s) - 1) for s, t in zip(found.lengths, found.times, strict=True))
-    pairs = list(zip(found.lengths, found.times, strict=True))
+def _straight(costs: Measured) -> Entry:
+    slope, start, r2 = fit(costs.lengths, costs.times)
+    off = 100 * max(abs(t / (start + slope * s) - 1) for s, t in zip(costs.lengths, costs.times, strict=True))
+    pairs = list(zip(costs.lengths, costs.times, strict=True))
     stretches = [(t - u) / (s - r) / slope for (r, u), (s, t) in pairwise(pairs)]
     note = (
         ", ".join(f"{s:g} s: {t:.1f} s" for s, t in pairs)
@@ -224,19 +224,19 @@ def _straight(found: Measured) -> Entry:
     return Entry("long motion, time off a straight line", off, "%", "<= 10", off <= 10, note)
 
 
-def _memory(found: Measured) -> Entry:
-    ratio = found.peaks_mb[-1] / found.peaks_mb[0]
-    note = ", ".join(f"{s:g} s: {peak:.0f} MB" for s, peak in zip(found.lengths, found.peaks_mb, strict=True))
-    name = f"long motion, memory of {found.lengths[-1]:g} s / {found.lengths[0]:g} s"
+def _memory(costs: Measured) -> Entry:
+    ratio = costs.peaks_mb[-1] / costs.peaks_mb[0]
+    note = ", ".join(f"{s:g} s: {peak:.0f} MB" for s, peak in zip(costs.lengths, costs.peaks_mb, strict=True))
+    name = f"long motion, memory of {costs.lengths[-1]:g} s / {costs.lengths[0]:g} s"
     return Entry(name, ratio, "times", "<= 1.3", ratio <= 1.3, f"{note}; peak resident, whole process")
 
 
-def _against_published(found: Measured) -> Entry:
-    total = sum(take.seconds for take in found.published)
-    ratio = total / found.times[-1]
-    first, second = found.published
+def _against_published(costs: Measured) -> Entry:
+    total = sum(take.seconds for take in costs.published)
+    ratio = total / costs.times[-1]
+    first, second = costs.published
     note = (
-        f"{found.lengths[-1]:g} s of motion: {found.times[-1]:.1f} s; published: {total:.0f} s, extrapolated from "
+        f"{costs.lengths[-1]:g} s of motion: {costs.times[-1]:.1f} s; published: {total:.0f} s, extrapolated from "
         f"{first.timed} steps of each take: {first.steps} steps of {first.step_s:.2f} s ({first.calls} calls of "
         f"{first.rows} x {first.frames} frames) and {second.steps} of {second.step_s:.2f} s ({second.calls} of "
         f"{second.rows} x {second.frames})"

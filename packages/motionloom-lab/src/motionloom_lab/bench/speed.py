@@ -46,7 +46,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How `generate` samples when nothing is said."""
+    """How `generate` samples by default."""
 
     steps: int = STEPS
     guidance: float = GUIDANCE
@@ -72,12 +72,12 @@ def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None =
     """
     times: list[list[float]] = [[] for _ in jobs]
     for turn in range(repeats + 1):
-        for job, kept in zip(jobs, times, strict=True) if turn else zip(jobs[:warm], times):
+        for job, seconds in zip(jobs, times, strict=True) if turn else zip(jobs[:warm], times):
             start = time.perf_counter()
             job()
             if turn:
-                kept.append(time.perf_counter() - start)
-    return [median(kept) for kept in times]
+                seconds.append(time.perf_counter() - start)
+    return [median(seconds) for seconds in times]
 
 
 def _walk(
@@ -186,7 +186,7 @@ finally:
     if os.path.exists("/proc/self/status"):
         print(*(line for line in open("/proc/self/status") if line.startswith("VmHWM")), file=sys.stderr)
 """
-"""A command that says its own peak at the end: what Linux tells the parent begins with the parent's memory."""
+"""A command that prints its own peak at the end: what Linux reports to the parent includes the parent's memory."""
 
 
 def process(arguments: Sequence[str]) -> Process:
@@ -197,18 +197,18 @@ def process(arguments: Sequence[str]) -> Process:
     if not hasattr(os, "wait4"):
         raise MotionloomError("this system does not tell what a process used; run bench on Linux or macOS")
     words = arguments if arguments[:1] == ("-c",) else ("-c", _COMMAND, *arguments)
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as log:
         start = time.perf_counter()
-        child = subprocess.Popen([sys.executable, *words], stdout=subprocess.DEVNULL, stderr=said)
+        child = subprocess.Popen([sys.executable, *words], stdout=subprocess.DEVNULL, stderr=log)
         _, status, used = os.wait4(child.pid, 0)
         seconds = time.perf_counter() - start
         child.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        lines = said.read().decode(errors="replace").strip().splitlines()
-        told = re.fullmatch(r"VmHWM:\s*(\d+) kB", lines.pop().strip()) if lines and "VmHWM" in lines[-1] else None
+        log.seek(0)
+        lines = log.read().decode(errors="replace").strip().splitlines()
+        match = re.fullmatch(r"VmHWM:\s*(\d+) kB", lines.pop().strip()) if lines and "VmHWM" in lines[-1] else None
         if child.returncode:
             raise MotionloomError(f"motionloom {' '.join(arguments)} failed: {lines[-1] if lines else 'no message'}")
-    peak = int(told[1]) if told else used.ru_maxrss / (2**10 if sys.platform == "darwin" else 1)
+    peak = int(match[1]) if match else used.ru_maxrss / (2**10 if sys.platform == "darwin" else 1)
     return Process(seconds, peak / 2**10, used.ru_utime + used.ru_stime)
 
 
@@ -230,7 +230,7 @@ def commands(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Proce
 
 LIBRARIES = ("-c", "import numpy, onnxruntime")
 SECONDS = 5
-"""Length of the motion that is made, read, written and drawn."""
+"""Length of the motion that is generated, read, written and shown."""
 MOST_MAKING, MOST_READING = 10.0, 3.5
 """Times an import of NumPy and ONNX Runtime."""
 
@@ -251,16 +251,16 @@ def starts(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Process
             "view": ("view", clip, "--out", str(Path(folder) / "walk.png")),
         }
         rounds = [{name: run(words) for name, words in commands.items()} for _ in range(repeats + 1)][1:]
-    taken = {name: median(one[name].seconds for one in rounds) for name in commands}
+    times = {name: median(one[name].seconds for one in rounds) for name in commands}
     busy = {name: median(one[name].processor for one in rounds) for name in commands}
-    return [_entry(name, taken, busy) for name in commands if name != "libraries"]
+    return [_entry(name, times, busy) for name in commands if name != "libraries"]
 
 
-def _entry(name: str, taken: dict[str, float], busy: dict[str, float]) -> Entry:
+def _entry(name: str, times: dict[str, float], busy: dict[str, float]) -> Entry:
     most = MOST_MAKING if name == "generate" else MOST_READING
-    ratio = taken[name] / taken["libraries"]
+    ratio = times[name] / times["libraries"]
     note = (
-        f"{taken[name]:.2f} s of {taken['libraries']:.2f}; "
+        f"{times[name]:.2f} s of {times['libraries']:.2f}; "
         f"of processor time {busy[name]:.2f} of {busy['libraries']:.2f}, "
         f"{busy[name] / busy['libraries']:.2f} times; {SECONDS} s of motion"
     )

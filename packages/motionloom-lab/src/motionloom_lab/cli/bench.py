@@ -22,14 +22,14 @@ def run_bench(arguments: argparse.Namespace) -> None:
         check_overwriting(arguments, [arguments.json])
     if arguments.long and arguments.prediction:
         fail("--long and --prediction are two measurements; ask for one")
-    found = _predicted(arguments) if arguments.prediction else _generated(arguments)
+    results = _predicted(arguments) if arguments.prediction else _generated(arguments)
     if arguments.json:
-        write_json(arguments.json, found)
-    on = found["machine"]
+        write_json(arguments.json, results)
+    on = results["machine"]
     print(
         f"{on['device']}, {on['cores']} cores, {on['threads']} threads, ONNX Runtime {on['onnxruntime']}, {on['type']}"
     )
-    print(plain(table(found)))
+    print(plain(table(results)))
     if on["load"] > 0.5:
         print(f"\nthe machine was busy when this began (load {on['load']}): run it again when nothing else does")
     print(f"\nWeights: {_weights(arguments)}")

@@ -35,38 +35,38 @@ def _run(name: str, arguments: argparse.Namespace) -> int | None:
     out = getattr(arguments, "out", None)
     if out is not None:
         check_overwriting(arguments, [out] if out.is_file() else sorted({*out.glob("*.md"), *out.glob("*/report.md")}))
-    given = {key: value for key, value in vars(arguments).items() if value is not None and value is not False}
-    return getattr(commands, options.commands()[name].run)({**given, "command": name})
+    values = {key: value for key, value in vars(arguments).items() if value is not None and value is not False}
+    return getattr(commands, options.commands()[name].run)({**values, "command": name})
 
 
-def words(said: str) -> tuple[str, ...]:
+def words(text: str) -> tuple[str, ...]:
     """What is between commas."""
-    return tuple(word.strip() for word in said.split(",") if word.strip())
+    return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
-def numbers(said: str) -> tuple[int, ...]:
+def numbers(text: str) -> tuple[int, ...]:
     """Whole numbers between commas."""
     try:
-        return tuple(int(word) for word in said.split(","))
+        return tuple(int(word) for word in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{said!r} are not whole numbers with commas, such as 5,20,50") from None
+        raise argparse.ArgumentTypeError(f"{text!r} are not whole numbers with commas, such as 5,20,50") from None
 
 
-def batch(said: str) -> int | str:
+def batch(text: str) -> int | str:
     """A number of motions, or all."""
     try:
-        return said if said == "all" else int(said)
+        return text if text == "all" else int(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{said!r} is no number of motions and not all") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of motions and not all") from None
 
 
-def times(said: str) -> tuple[int, int]:
+def times(text: str) -> tuple[int, int]:
     """Captions x motions of each."""
     try:
-        captions, motions = (int(word) for word in ("0x0" if said == "0" else said).split("x"))
+        captions, motions = (int(word) for word in ("0x0" if text == "0" else text).split("x"))
         return captions, motions
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{said!r} is not captions x motions of each, such as 10x10, or 0") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not captions x motions of each, such as 10x10, or 0") from None
 
 
 READERS: dict[str, Callable[[str], Any]] = SHARED | {

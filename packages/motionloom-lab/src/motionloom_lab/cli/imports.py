@@ -76,8 +76,8 @@ def _import_predictor(arguments: argparse.Namespace) -> None:
 
     if arguments.mean or arguments.std:
         raise MotionloomError("HumanMAC works on metres as they are: no --mean and no --std")
-    made = import_humanmac(arguments.checkpoint, name=arguments.name, licence=arguments.licence)
-    print(f"wrote {save_predictor(made, arguments.out, half=arguments.half)}")
+    predictor = import_humanmac(arguments.checkpoint, name=arguments.name, licence=arguments.licence)
+    print(f"wrote {save_predictor(predictor, arguments.out, half=arguments.half)}")
 
 
 def _import_evaluator(arguments: argparse.Namespace) -> None:
@@ -86,7 +86,7 @@ def _import_evaluator(arguments: argparse.Namespace) -> None:
     if arguments.half:
         raise MotionloomError("an evaluator is kept as float32, so that its numbers are the published ones: no --half")
     card = {"name": arguments.name, "licence": arguments.licence}
-    made = read_published(
+    evaluator = read_published(
         arguments.checkpoint,
         mean=arguments.mean,
         std=arguments.std,
@@ -94,8 +94,8 @@ def _import_evaluator(arguments: argparse.Namespace) -> None:
         lists=arguments.vip,
         card={key: value for key, value in card.items() if value},
     )
-    print(f"wrote {save_guo(made, arguments.out)}")
-    for key, value in made.about.items():
+    print(f"wrote {save_guo(evaluator, arguments.out)}")
+    for key, value in evaluator.about.items():
         print(f"  {key:<14} {value}")
 
 

@@ -52,10 +52,10 @@ def score(
     for number, check in enumerate(checks):
         frames = [round(check.seconds * prior.fps)] * seeds
         for one in sample_features(prior, [check.prompt] * seeds, frames, seeds=list(range(seeds)), **settings):
-            drawn = one.astype(np.float64)
-            features.append(drawn)
+            motion = one.astype(np.float64)
+            features.append(motion)
             prompts.append(number)
-            obeyed.append(check.obeyed(measure(humanml.decode_positions(drawn), prior.fps)))
+            obeyed.append(check.obeyed(measure(humanml.decode_positions(motion), prior.fps)))
     texts = evaluator.texts([Caption(check.prompt) for check in checks])
     far = np.linalg.norm(evaluator.motions(features)[:, None] - texts[None], axis=-1)
     return Scored(np.array(prompts), np.array(obeyed), far)
@@ -78,8 +78,8 @@ def within_prompts(scored: Sequence[Scored]) -> Value:
     if not pairs:
         return Value(float("nan"))
     won, of = np.array(wins), np.array(pairs)
-    drawn = np.random.default_rng(0).integers(len(of), size=(1000, len(of)))
-    spread = (won[drawn].sum(1) / of[drawn].sum(1)).std()
+    picks = np.random.default_rng(0).integers(len(of), size=(1000, len(of)))
+    spread = (won[picks].sum(1) / of[picks].sum(1)).std()
     return Value(float(won.sum() / of.sum()), float(1.96 * spread), len(of))
 
 
@@ -115,11 +115,11 @@ def agreement(
 
 def _row(name: str, scored: Scored) -> Row:
     count = len(scored.prompts)
-    found = float((scored.distances.argmin(1) == scored.prompts).mean())
+    top1 = float((scored.distances.argmin(1) == scored.prompts).mean())
     values = {
         "obeyed": Value(float(scored.obeyed.mean()), count=count),
         "nearness": Value.of((2.0 - scored.own).tolist()),
-        "top1": Value(found, count=count),
+        "top1": Value(top1, count=count),
         "auc": within_prompts([scored]),
     }
     return Row(name, values)
@@ -127,9 +127,11 @@ def _row(name: str, scored: Scored) -> Row:
 
 def _notes(rows: Sequence[Row]) -> list[str]:
     ranked = [row for row in rows if "obeyed" in row.values]
-    said = []
+    sentences = []
     for column in ("nearness", "top1"):
         orders = [sorted(ranked, key=lambda row, c=c: -row.values[c].mean) for c in ("obeyed", column)]
         same = [row.name for row in orders[0]] == [row.name for row in orders[1]]
-        said.append(f"The ways to sample are {'' if same else 'NOT '}in the same order by {column} as by obedience.")
-    return said
+        sentences.append(
+            f"The ways to sample are {'' if same else 'NOT '}in the same order by {column} as by obedience."
+        )
+    return sentences

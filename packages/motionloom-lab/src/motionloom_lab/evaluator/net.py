@@ -28,7 +28,7 @@ from motionloom_train.tensors import tensor
 
 EVALUATORS = Container("evaluator", "motionloom_evaluator", max_bytes=100 << 20)
 KEY = EVALUATORS.key
-"""Metadata entry that says the file's kind."""
+"""Metadata entry with the file's kind."""
 INPUTS = 4 + 63 + 66 + 4
 """Numbers per frame that the motion encoder reads, see `inputs`."""
 STRIDE = 4
@@ -138,9 +138,9 @@ class MotionEncoder(nn.Module):
         x = F.gelu(self.second(x)).transpose(1, 2)
         valid = _valid(lengths // STRIDE, x.shape[1])
         if self.training:  # no single moment may decide: seen like this, few recordings last longer
-            seen = torch.rand(valid.shape, device=valid.device) >= FORGET
-            seen[:, 0] = True
-            valid = valid & seen
+            keep = torch.rand(valid.shape, device=valid.device) >= FORGET
+            keep[:, 0] = True
+            valid = valid & keep
         x = x + places(x.shape[1], x.shape[2]).to(x)
         for block in self.blocks:
             x = block(x, valid)
@@ -223,7 +223,7 @@ class Embedder:
 
         Each row is independent of the others. Raises MotionloomError for other shapes, fewer than 4 frames, NaN.
         """
-        found = np.zeros((len(features), self.net.config.embed))
+        points = np.zeros((len(features), self.net.config.embed))
         for number, one in enumerate(features):
             if one.ndim != 2 or one.shape[1] != WIDTH or len(one) < STRIDE or not np.isfinite(one).all():
                 raise MotionloomError(
@@ -238,17 +238,17 @@ class Embedder:
             for row, i in enumerate(rows):
                 batch[row, : lengths[row]] = torch.from_numpy(np.asarray(features[i], dtype=np.float64))
             x = standardised(inputs(batch, lengths), lengths, self.mean.double(), self.std.double())
-            found[rows] = self.net.motion(x.float(), lengths).double().numpy()
-        return found
+            points[rows] = self.net.motion(x.float(), lengths).double().numpy()
+        return points
 
     @torch.no_grad()
     def texts(self, captions: Sequence[Caption]) -> np.ndarray:
         """Sentences to unit vectors (captions, embed) float64; tokens are not read."""
-        found = np.zeros((len(captions), self.net.config.embed))
+        points = np.zeros((len(captions), self.net.config.embed))
         for first in range(0, len(captions), ROWS):
-            said = self.text.encode([caption.text for caption in captions[first : first + ROWS]])
-            found[first : first + ROWS] = self.net.text(tensor(said.tokens), tensor(said.mask)).double().numpy()
-        return found
+            code = self.text.encode([caption.text for caption in captions[first : first + ROWS]])
+            points[first : first + ROWS] = self.net.text(tensor(code.tokens), tensor(code.mask)).double().numpy()
+        return points
 
 
 def text_digest(text: TextEncoder) -> str:
@@ -271,14 +271,14 @@ def save_embedder(embedder: Embedder, path: Path | str) -> Path:
 
 
 def is_embedder(path: Path) -> bool:
-    """True for a file of `save_embedder`, damaged or not, by what its head says."""
+    """True for a file of `save_embedder`, damaged or not, by its head."""
     return EVALUATORS.signed(path)
 
 
 def load_embedder(path: Path | str, text: TextEncoder) -> Embedder:
     """Read an evaluator for use with ``text``.
 
-    Raises MotionloomError where the file is damaged, of another kind or made for another text encoder.
+    Raises MotionloomError where the file is damaged, of another kind or for another text encoder.
     """
     path = Path(path)
     about, tensors = _read(path)

@@ -1,4 +1,4 @@
-"""The own evaluator: opened, and asked on held-out real motions what it notices.
+"""The own evaluator: its file, and what it notices on held-out real motions.
 
 Whether its numbers can be trusted is a measurement like any other: motions are damaged by known amounts, and the
 distances must grow with the amount.
@@ -80,13 +80,13 @@ def held_out(clips: Sequence[Clip]) -> HeldOut:
     captioned, captions, windows, turns = [], [], [], []
     for clip in clips:
         for note in clip.notes:
-            shown = clip.features[note.first : note.last]
-            if note.kind == "human" and len(shown) >= SHORTEST:
-                captioned.append(shown)
+            piece = clip.features[note.first : note.last]
+            if note.kind == "human" and len(piece) >= SHORTEST:
+                captioned.append(piece)
                 captions.append(note.texts)
             elif note.kind in LABELS and re.search(r"left|right", note.kind):
-                named = [said for said in LABELS[note.kind] if mirror_text(said) != said]
-                turns.append((shown[: 2 * WINDOW], f"a person {named[len(turns) % len(named)]}"))
+                named = [text for text in LABELS[note.kind] if mirror_text(text) != text]
+                turns.append((piece[: 2 * WINDOW], f"a person {named[len(turns) % len(named)]}"))
         for start in range(0, len(clip.features), WINDOW):
             if len(part := clip.features[start : start + WINDOW]) >= 2 * SHORTEST:
                 windows.append(part)
@@ -157,12 +157,12 @@ class Judge:
     @cached_property
     def owner(self) -> np.ndarray:
         """(captions,) the motion of each caption."""
-        return np.repeat(np.arange(len(self.held.captions)), [len(said) for said in self.held.captions])
+        return np.repeat(np.arange(len(self.held.captions)), [len(captions) for captions in self.held.captions])
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """All captions in order."""
-        return tuple(text for said in self.held.captions for text in said)
+        return tuple(text for captions in self.held.captions for text in captions)
 
     @cached_property
     def texts(self) -> Array:
@@ -179,53 +179,53 @@ class Judge:
         """(windows, width)."""
         return self.evaluator.motions(self.held.windows)
 
-    def retrieval(self, motions: Array, *, shuffled: float = 0.0, kept: np.ndarray | None = None) -> dict[str, Value]:
+    def retrieval(self, motions: Array, *, shuffled: float = 0.0, pool: np.ndarray | None = None) -> dict[str, Value]:
         """R-precision, median rank and distance over ``repeats`` reshuffles, each with one caption per motion.
 
-        motions: (motions, width). shuffled: share of the captions that are handed on to other motions. kept: captions
-        (numbers) to take from; None: all. Too few motions for a batch: nothing.
+        motions: (motions, width). shuffled: share of the captions that are handed on to other motions. pool: numbers
+        of the captions to take from; None: all. Too few motions for a batch: nothing.
         """
-        found: dict[str, list[float]] = {"top1": [], "top2": [], "top3": [], "rank": [], "distance": []}
-        usable = np.arange(len(self.sentences)) if kept is None else kept
+        numbers: dict[str, list[float]] = {"top1": [], "top2": [], "top3": [], "rank": [], "distance": []}
+        usable = np.arange(len(self.sentences)) if pool is None else pool
         rng = np.random.default_rng((self.seed, 7))
         for _ in range(self.repeats):
             mixed = rng.permutation(usable)
-            _, first = np.unique(self.owner[mixed], return_index=True)  # one caption each, drawn
-            drawn = rng.permutation(mixed[first])
-            if len(drawn) < BATCH:
+            _, first = np.unique(self.owner[mixed], return_index=True)  # one random caption each
+            picks = rng.permutation(mixed[first])
+            if len(picks) < BATCH:
                 return {}
-            texts, shown = self.texts[_handed_on(drawn, shuffled, rng)], motions[self.owner[drawn]]
-            for name, value in zip(("top1", "top2", "top3"), r_precision(texts, shown, batch=BATCH), strict=True):
-                found[name].append(float(value))
-            found["rank"].append(median_rank(texts, shown))
-            found["distance"].append(matching_distance(texts, shown))
-        return {name: Value.of(values) for name, values in found.items()}
+            texts, points = self.texts[_handed_on(picks, shuffled, rng)], motions[self.owner[picks]]
+            for name, value in zip(("top1", "top2", "top3"), r_precision(texts, points, batch=BATCH), strict=True):
+                numbers[name].append(float(value))
+            numbers["rank"].append(median_rank(texts, points))
+            numbers["distance"].append(matching_distance(texts, points))
+        return {name: Value.of(values) for name, values in numbers.items()}
 
-    def noticed(self, damaged: Array, kept: np.ndarray) -> Value:
-        """Share of the captions ``kept`` nearer to their own motion than to its damaged copy (motions, width)."""
-        texts, own = self.texts[kept], self.owner[kept]
-        before, after = (np.linalg.norm(texts - shown[own], axis=1) for shown in (self.motions, damaged))
-        return Value(float((before < after).mean()), count=len(kept))
+    def noticed(self, damaged: Array, pool: np.ndarray) -> Value:
+        """Share of the captions ``pool`` nearer to their own motion than to its damaged copy (motions, width)."""
+        texts, own = self.texts[pool], self.owner[pool]
+        before, after = (np.linalg.norm(texts - motions[own], axis=1) for motions in (self.motions, damaged))
+        return Value(float((before < after).mean()), count=len(pool))
 
     def sides(self) -> Value:
         """Share of `HeldOut.turns` whose words are nearer to them than to their mirror image."""
         texts = self.evaluator.texts([Caption(text) for _, text in self.held.turns])
-        shown = [motion for motion, _ in self.held.turns]
+        windows = [motion for motion, _ in self.held.turns]
         before, after = (
             np.linalg.norm(texts - self.evaluator.motions(motions), axis=1)
-            for motions in (shown, [humanml.mirror(motion) for motion in shown])
+            for motions in (windows, [humanml.mirror(motion) for motion in windows])
         )
-        return Value(float((before < after).mean()), count=len(shown))
+        return Value(float((before < after).mean()), count=len(windows))
 
-    def row(self, name: str, damage: Damage, *, kept: np.ndarray | None = None) -> Row:
+    def row(self, name: str, damage: Damage, *, pool: np.ndarray | None = None) -> Row:
         """Everything about one damage."""
         rng = np.random.default_rng((self.seed, 11))
         damaged = self.evaluator.motions([damage(one, rng) for one in self.held.captioned])
-        values = self.retrieval(damaged, kept=kept)
-        every = np.arange(len(self.sentences)) if kept is None else kept
+        values = self.retrieval(damaged, pool=pool)
+        every = np.arange(len(self.sentences)) if pool is None else pool
         if len(every):
             values["noticed"] = self.noticed(damaged, every)
-        if kept is None:
+        if pool is None:
             windows = self.evaluator.motions([damage(one, rng) for one in self.held.windows])
             values["fid"] = Value(fid(windows, self.windows))
         return Row(name, values)
@@ -237,11 +237,11 @@ def median_rank(texts: Array, motions: Array) -> float:
     return float(np.median((far < np.diag(far)[:, None]).sum(1)) + 1)
 
 
-def _handed_on(drawn: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
-    """``drawn`` with a share of its entries, chosen at random, moved round by one place among themselves."""
-    moved = rng.permutation(len(drawn))[: round(share * len(drawn))]
-    result = drawn.copy()
-    result[moved] = drawn[np.roll(moved, 1)]
+def _handed_on(picks: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+    """``picks`` with a share of its entries, chosen at random, moved round by one place among themselves."""
+    moved = rng.permutation(len(picks))[: round(share * len(picks))]
+    result = picks.copy()
+    result[moved] = picks[np.roll(moved, 1)]
     return result
 
 
@@ -278,9 +278,9 @@ def validate(
         ("reversed, captions of ways and levels", reverse, timed),
         ("mirrored, captions with a side", mirror, sided),
     ]
-    rows.append(Row("real, captions with a side", judge.retrieval(judge.motions, kept=sided)))
-    for name, damage, kept in damages:
-        rows.append(judge.row(name, damage, kept=kept))
+    rows.append(Row("real, captions with a side", judge.retrieval(judge.motions, pool=sided)))
+    for name, damage, pool in damages:
+        rows.append(judge.row(name, damage, pool=pool))
         progress(name)
     if held.turns:
         rows.append(Row("mirrored, measured turns to a side", {"noticed": judge.sides()}))
@@ -330,7 +330,7 @@ def series() -> dict[str, list[str]]:
 def notes(rows: Sequence[Row], judge: Judge) -> list[str]:
     """Which responses are monotone in the amount, and what the rows are."""
     by_name = {row.name: row.values for row in rows}
-    said = [
+    sentences = [
         f"FID in the row 'real' is that of one half of the {len(judge.windows)} windows against the other; a damaged "
         "row compares the same windows before and after, so that no damage gives 0.",
         "Mirrored copies of the held-out clips are among them, so FID cannot see mirroring; captions can.",
@@ -341,8 +341,10 @@ def notes(rows: Sequence[Row], judge: Judge) -> list[str]:
             begin = Value(0.0) if column == "fid" else by_name["real"].get(column)
             if begin and chain and len(chain) == len(amounts):
                 right = monotone([begin, *chain], way)
-                said.append(f"{name}: {column} is {'' if right else 'NOT '}monotone in the amount, within intervals.")
-    return said
+                sentences.append(
+                    f"{name}: {column} is {'' if right else 'NOT '}monotone in the amount, within intervals."
+                )
+    return sentences
 
 
 def monotone(values: Sequence[Value], way: int) -> bool:

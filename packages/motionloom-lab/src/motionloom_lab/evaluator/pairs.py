@@ -23,11 +23,11 @@ LONGEST = 200
 """Frames: what captions of the field describe. Longer stretches of a lasting state are cropped to 40 to 200."""
 SHORTEST = 20
 ALIKE = 0.7
-"""Cosine of two pooled sentence vectors above which they say the same and are no negatives of each other."""
+"""Cosine of two pooled sentence vectors above which they mean the same and are no negatives of each other."""
 HARD = 0.33
 """Most rows of a batch that get a contrary motion or sentence."""
 DERIVED = re.compile(r"_(looped|reversed|bent\d*)$")
-"""The end of names of clips made of one recording: ``M05_01_bent2`` and ``M05_01`` are one, mirrored ones apart."""
+"""The end of names of clips of one recording: ``M05_01_bent2`` and ``M05_01`` are one, mirrored ones apart."""
 _ONWARD = {"forward": "backward", "forwards": "backwards", "backward": "forward", "backwards": "forwards"}
 _ONWARD_WORD = re.compile(r"\b(forwards?|backwards?)\b", re.IGNORECASE)
 _SENSES = tuple(
@@ -43,7 +43,7 @@ _SENSES = tuple(
         r"\bdown(wards?)?\b",
     )
 )
-"""Directions in opposite pairs: words that pooled sentence vectors hardly tell apart."""
+"""Directions in opposite pairs: words that pooled sentence vectors hardly distinguish."""
 TIMED = re.compile(
     r"\b(walk|run|ran|jog|step|climb|stairs|sit|sits|sat|stand(s|ing)? up|jump(s|ed|ing)? (forward|down|over)|forward|"
     r"backward|kick|throw|lift|pick|rais|lower|crouch|kneel|bend)",
@@ -66,7 +66,7 @@ def senses(texts: Sequence[str]) -> Tensor:
 
 
 def opposed(first: Tensor, second: Tensor) -> Tensor:
-    """(n, 8) and (m, 8) `senses` to (n, m) bool: one says only left where the other says only right, and so on."""
+    """(n, 8) and (m, 8) `senses` to (n, m) bool: one has only left where the other has only right, and so on."""
     only = [side & ~side.unflatten(-1, (-1, 2)).flip(-1).flatten(-2) for side in (first, second)]
     other = only[1].unflatten(-1, (-1, 2)).flip(-1).flatten(-2)
     return (only[0][:, None] & other[None]).any(-1)
@@ -103,15 +103,15 @@ class Pairs:
     def __init__(self, data: MotionSet, takes: Sequence[int], *, hard: float = HARD) -> None:
         self.data, self.takes, self.hard = data, tuple(takes), hard
         known = {text: number for number, text in enumerate(data.texts)}
-        said = list(data.texts)
+        texts = list(data.texts)
         self.contrary: list[int] = []
         for text in data.texts:
             other = contrary(text)
             if other not in known:
-                known[other] = len(said)
-                said.append(other)
+                known[other] = len(texts)
+                texts.append(other)
             self.contrary.append(known[other])
-        self.texts = tuple(said)
+        self.texts = tuple(texts)
         """All sentences: those of the data first, then contraries that it lacks."""
         groups = sorted({item.group for item in data.items})
         self._group = {name: number for number, name in enumerate(groups)}
@@ -129,12 +129,12 @@ class Pairs:
         return Pairs(data, [families[place] for place in places], hard=hard)
 
     def _pool(self) -> dict[str, list[np.ndarray]]:
-        found: dict[str, dict[str, list[int]]] = {}
+        pools: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(self.data.items):
             kind = item.group if item.group in SHARE else "label"
             if item.frames >= SHORTEST:
-                found.setdefault(kind, {}).setdefault(item.group, []).append(number)
-        return {kind: [np.array(numbers) for numbers in groups.values()] for kind, groups in found.items()}
+                pools.setdefault(kind, {}).setdefault(item.group, []).append(number)
+        return {kind: [np.array(numbers) for numbers in groups.values()] for kind, groups in pools.items()}
 
     def window(self, item: Item, rng: np.random.Generator) -> np.ndarray:
         """The frames to show: whole events, up to a tenth less of captioned stretches, a part of what lasts."""
@@ -155,13 +155,13 @@ class Pairs:
             groups = self._pools[kinds[kind]]
             numbers.append(int(rng.choice(groups[rng.integers(len(groups))])))
         items = [self.data.items[n] for n in numbers]
-        shown = [self.window(item, rng) for item in items]
+        windows = [self.window(item, rng) for item in items]
         texts = [item.texts[rng.integers(len(item.texts))] for item in items]
-        motions, motion_rows = self._hard_motions(shown, texts, rng)
+        motions, motion_rows = self._hard_motions(windows, texts, rng)
         text_rows = [row for row, text in enumerate(texts) if self.contrary[text] != text][: round(self.hard * rows)]
-        lengths = torch.tensor([len(m) for m in (*shown, *motions)])
+        lengths = torch.tensor([len(m) for m in (*windows, *motions)])
         features = torch.zeros(len(lengths), int(lengths.max()), WIDTH)
-        for row, motion in enumerate((*shown, *motions)):
+        for row, motion in enumerate((*windows, *motions)):
             features[row, : len(motion)] = torch.from_numpy(motion)
         alone = ("human", "index")  # captions: each its own group
         return PairBatch(
@@ -176,13 +176,13 @@ class Pairs:
         )
 
     def _hard_motions(
-        self, shown: Sequence[np.ndarray], texts: Sequence[int], rng: np.random.Generator
+        self, windows: Sequence[np.ndarray], texts: Sequence[int], rng: np.random.Generator
     ) -> tuple[list[np.ndarray], list[int]]:
         """Mirror images where a sentence names a side, films run backwards where it names what shows that."""
         motions: list[np.ndarray] = []
         rows: list[int] = []
-        for row, (motion, number) in enumerate(zip(shown, texts, strict=True)):
-            if len(rows) >= round(self.hard * len(shown)):
+        for row, (motion, number) in enumerate(zip(windows, texts, strict=True)):
+            if len(rows) >= round(self.hard * len(windows)):
                 break
             text = self.texts[number]
             sided, timed = mirror_text(text) != text, TIMED.search(text) is not None
@@ -201,7 +201,7 @@ def negatives(batch: PairBatch, pooled: Tensor, directions: Tensor) -> Tensor:
     same recording, sentences that are alike, unless they name opposite directions.
     """
     texts = batch.texts[: batch.rows]
-    said = torch.nn.functional.normalize(pooled[texts].float(), dim=-1)
-    apart = (said @ said.T < ALIKE) | opposed(directions[texts], directions[texts])
+    unit = torch.nn.functional.normalize(pooled[texts].float(), dim=-1)
+    apart = (unit @ unit.T < ALIKE) | opposed(directions[texts], directions[texts])
     same = (batch.groups[:, None] == batch.groups) | (batch.takes[:, None] == batch.takes)
     return apart & ~same

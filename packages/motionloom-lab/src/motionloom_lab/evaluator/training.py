@@ -51,20 +51,20 @@ class Contrast:
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`."""
         batch = self.pairs.draw(seed, step, rows)
-        said = self.words.condition(batch.texts, batch.lengths[:1].expand(len(batch.texts)))
+        condition = self.words.condition(batch.texts, batch.lengths[:1].expand(len(batch.texts)))
         generator = torch.Generator().manual_seed(number_of(seed, step))
-        seen = said.words & (torch.rand(said.words.shape, generator=generator) >= FORGET)
-        seen[:, 0] = True
+        keep = condition.words & (torch.rand(condition.words.shape, generator=generator) >= FORGET)
+        keep[:, 0] = True
         lengths = batch.lengths.to(self.device)
         x = standardised(inputs(batch.features.to(self.device), lengths), lengths, self.mean, self.std)
-        motions, texts = net(x, lengths, said.tokens.to(self.device), seen.to(self.device))
+        motions, texts = net(x, lengths, condition.tokens.to(self.device), keep.to(self.device))
         allowed = negatives(batch, self.words.pooled, self.directions).to(self.device)
         sharpness = self.net.sharpness.clamp(max=SHARPEST).exp()
         hard_motion, hard_text = batch.hard_motion.to(self.device), batch.hard_text.to(self.device)
         with torch.autocast(torch.device(self.device).type, enabled=False):
-            found, said_as = motions[:rows].float(), texts[:rows].float()
-            from_text = contrast(said_as * sharpness, found, motions[rows:].float(), hard_motion, allowed)
-            from_motion = contrast(found * sharpness, said_as, texts[rows:].float(), hard_text, allowed.T)
+            motion, text = motions[:rows].float(), texts[:rows].float()
+            from_text = contrast(text * sharpness, motion, motions[rows:].float(), hard_motion, allowed)
+            from_motion = contrast(motion * sharpness, text, texts[rows:].float(), hard_text, allowed.T)
             own = torch.arange(rows, device=self.device)
             return (F.cross_entropy(from_text, own) + F.cross_entropy(from_motion, own)) / 2
 
@@ -87,10 +87,10 @@ def input_statistics(pairs: Pairs, *, seed: int) -> tuple[Tensor, Tensor]:
     rng = np.random.default_rng(seed)
     parts = []
     for number in rng.integers(len(pairs.data.items), size=min(1500, 20 * len(pairs.data.items))):
-        shown = torch.from_numpy(pairs.window(pairs.data.items[number], rng))[None].double()
-        parts.append(inputs(shown, torch.tensor([shown.shape[1]]))[0])
-    seen = torch.cat(parts)
-    mean, std = seen.mean(0), seen.std(0)
+        window = torch.from_numpy(pairs.window(pairs.data.items[number], rng))[None].double()
+        parts.append(inputs(window, torch.tensor([window.shape[1]]))[0])
+    frames = torch.cat(parts)
+    mean, std = frames.mean(0), frames.std(0)
     for block in BLOCKS:
         std[block] = std[block].mean().clamp(min=1e-4)
     return mean.float(), std.float()
@@ -115,12 +115,12 @@ def train_evaluator(run: Training, data: Path | str, text: TextEncoder) -> Path:
     )
 
     def export(average: Average, step: int) -> None:
-        made = EvaluatorNet(config)
-        made.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
+        result = EvaluatorNet(config)
+        result.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
         licences = "; ".join(pairs.data.licences)
         how = f"recipe {recipe.name}, {step} steps of {recipe.batch} pairs, seed {recipe.seed}"
         card = {"name": recipe.name, "licence": recipe.licence or licences, "data": licences, "made": how}
-        save_embedder(Embedder(made.eval(), mean, std, text, card), run.place)
+        save_embedder(Embedder(result.eval(), mean, std, text, card), run.place)
 
     return run.run(objective, export, about)
 

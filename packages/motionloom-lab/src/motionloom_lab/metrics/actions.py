@@ -1,4 +1,4 @@
-"""One clip of motion as a row of named numbers, from which the obedience checks are made.
+"""One clip of motion as a row of named numbers, which the obedience checks compare.
 
 ``positions`` (frames, 22, 3) metres on the uniform person, SMPL order, the floor near y = 0.
 """
@@ -20,8 +20,8 @@ MEANING: dict[str, str] = read_table("motionloom_lab.suites", "actions.toml")
 def measure(positions: np.ndarray, fps: float) -> Measures:
     """All numbers of `MEANING` for one clip, rounded to four places."""
     p = np.asarray(positions, dtype=np.float64)
-    found = {**_path(p, fps), **_legs(p, fps), **_arms(p, fps), **_posture(p, fps), "whole": wholeness(p)}
-    return {name: round(float(value), 4) for name, value in found.items()}
+    values = {**_path(p, fps), **_legs(p, fps), **_arms(p, fps), **_posture(p, fps), "whole": wholeness(p)}
+    return {name: round(float(value), 4) for name, value in values.items()}
 
 
 def _path(p: Array, fps: float) -> Measures:

@@ -1,7 +1,7 @@
 """How bodies are held, beside recorded people on their own skeletons: bends, the height of a standing head, bones.
 
-The other numbers of realism compare drawn motions with clips of a built set, and what was wrong with the bodies of a
-set would be wrong on both sides. These compare with recordings before anything was retargeted.
+The other numbers of realism compare generated motions with clips of a built set, and what was wrong with the bodies
+of a set would be wrong on both sides. These compare with recordings before anything was retargeted.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ STRETCHED = 0.1
 ASTRAY = 40.0
 """Degrees: where a recording's median bend of pelvis or spine is more, its skeleton has those joints elsewhere."""
 SLACK_CM = 6.0
-"""How far a head may be out of reach: drawn backs are curved, and recorded ones are measured as if straight."""
+"""How far a head may be out of reach: generated backs are curved, and recorded ones are measured as if straight."""
 STRAIGHT = 35.0
 """Degrees: knees that are bent less are those of somebody who stands (or lies; then hips are not high)."""
 
@@ -43,7 +43,7 @@ MEANING = {
 
 @dataclass(frozen=True)
 class BodyNumber:
-    """One number of drawn bodies beside recorded ones."""
+    """One number of generated bodies beside recorded ones."""
 
     name: str
     median: float
@@ -99,11 +99,11 @@ def reach_of(recordings: Iterable[Array]) -> Reach:
 
 
 def compare_bodies(clips: Sequence[Array], reach: Reach) -> list[BodyNumber]:
-    """The numbers of drawn motions, (frames, 22, 3) metres each; ``head`` is left out where nobody stands."""
-    found = [signals(clip) for clip in clips]
+    """The numbers of generated motions, (frames, 22, 3) metres each; ``head`` is left out where nobody stands."""
+    parts = [signals(clip) for clip in clips]
     rows = []
     for name in MEANING:
-        values = np.concatenate([one[name] for one in found] or [np.zeros(0)])
+        values = np.concatenate([one[name] for one in parts] or [np.zeros(0)])
         if len(values):
             low, high = reach[name][0] - _slack(name), reach[name][-1] + _slack(name)
             outside = float(((values < low) | (values > high)).mean())

@@ -1,7 +1,7 @@
 """How two people move together: errors of a completion, and what errors cannot see.
 
 Every function takes ``positions`` (2, frames, 22, 3) in metres in one world, SMPL joint order, +Y up, the floor at
-y = 0, at 20 frames per second unless ``fps`` says otherwise. Angles are radians. `motionloom_lab.metrics.pair_groups`
+y = 0, at 20 frames per second unless ``fps`` is given. Angles are radians. `motionloom_lab.metrics.pair_groups`
 compares groups of duets with real ones.
 """
 
@@ -48,7 +48,7 @@ class HorizonError:
 def completion_errors(real: np.ndarray, predicted: np.ndarray) -> tuple[HorizonError, ...]:
     """Prefix completion of two people (Shafir et al., priorMDM, 2023, table 3): one `HorizonError` per horizon.
 
-    Both are (crops, 2, frames, 22, 3) or one crop without the first axis. Each is put in the frame of its own person 0
+    Both are (crops, 2, frames, 22, 3) or one crop without the first axis. Each is in the frame of its own person 0
     at frame 0 (`in_first_frame`), as the published evaluation decodes it. Horizons are cumulative: seconds k averages
     frames `PREFIX` to ``PREFIX + k FPS``. Raises MotionloomError for other shapes or too few frames.
     """
@@ -176,7 +176,7 @@ def _correlation(first: Array, second: Array) -> float:
 
 
 def pair_stats(positions: np.ndarray, fps: float = FPS) -> dict[str, float]:
-    """All numbers of one duet of at least two frames, means over frames and people unless said otherwise.
+    """All numbers of one duet of at least two frames, means over frames and people unless noted otherwise.
 
     Metres: ``distance`` from pelvis to pelvis on the ground and ``distance_range``, its standard deviation;
     ``hand_distance`` between the nearest wrists; ``penetration``, the deepest overlap of the bodies. Radians:

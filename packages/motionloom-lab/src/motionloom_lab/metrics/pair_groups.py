@@ -118,7 +118,7 @@ def shuffled(pairs: Sequence[np.ndarray], *, shift: int = 1, placed: bool = True
         shift: Whose partner: no multiple of the number of duets. With windows of one recording in a row, more than
             their number, or neighbours in time take each other's partner.
         placed: Whether the stranger is moved rigidly on the ground to begin where the true partner begins, facing as
-            they do, so that only what follows tells them apart; False leaves everybody where they were recorded.
+            they do, so that only what follows differs; False leaves everybody where they were recorded.
 
     Raises:
         MotionloomError: Fewer than two duets, or a shift that gives everybody the own partner back.

@@ -90,17 +90,17 @@ def similar_windows(last_poses: np.ndarray, threshold: float, chunk: int = 256) 
     p = poses.astype(np.float64)
     p = p - p.mean(axis=0)
     square = np.square(p).sum(axis=1)
-    found: list[NDArray[np.int32]] = []
+    result: list[NDArray[np.int32]] = []
     for start in range(0, len(p), chunk):
         own = np.arange(start, min(start + chunk, len(p)))
         gap = square[own, None] + square - 2 * (p[own] @ p.T) - threshold**2
-        # where products cannot tell the side of the threshold, differences do
+        # where products are too inexact beside the threshold, differences decide
         row, column = np.nonzero(np.abs(gap) < _ROUNDING * (square[own, None] + square + threshold**2))
         for few in range(0, len(row), chunk):
             r, c = row[few : few + chunk], column[few : few + chunk]
             gap[r, c] = np.linalg.norm(poses[own[r]] - poses[c].astype(np.float64), axis=1) - threshold
-        found += [np.flatnonzero(near < 0).astype(np.int32) for near in gap]
-    return found
+        result += [np.flatnonzero(near < 0).astype(np.int32) for near in gap]
+    return result
 
 
 # ---- movement
@@ -199,7 +199,7 @@ class WindowScores(NamedTuple):
     futures: int
     """How many real futures the window has, the truth counted."""
     speeds: Array
-    """(F - 1,) metres per frame, what CMD is made of."""
+    """(F - 1,) metres per frame, what CMD is computed from."""
     numbers: dict[str, float]
     """By the name of `METRICS`; what cannot be measured (see `score_window`) is absent."""
 
@@ -253,7 +253,7 @@ class Average(NamedTuple):
 
 
 class Tally:
-    """Means over windows, windows of a single future treated as ``singles`` says; keeps no samples."""
+    """Means over windows, windows of a single future treated by ``singles``; keeps no samples."""
 
     def __init__(self, singles: Singles = "all") -> None:
         if singles not in get_args(Singles):

@@ -1,6 +1,6 @@
 """Whether predicted bodies stay bodies: limbs of one length, joints that bend as they do, no jerk, no step at the seam.
 
-``samples`` (S, F, J, 3) are the futures a system drew, ``truth`` (F, J, 3) is what came; metres from the root, without
+``samples`` (S, F, J, 3) are sampled futures, ``truth`` (F, J, 3) is what came; metres from the root, without
 the root itself. Limb metrics: Curreli et al., Nonisotropic Gaussian Diffusion for Realistic 3D Human Motion Prediction
 (SkeletonDiffusion), CVPR 2025, as its code computes them. What cannot be measured raises `MotionloomError`.
 """
@@ -73,14 +73,14 @@ def limbs_of(parents: Sequence[int]) -> Limbs:
 
 
 def _follow(
-    pairs: tuple[tuple[int, int], ...], first: int, joint: int, chain: list[int], found: list[tuple[int, ...]]
+    pairs: tuple[tuple[int, int], ...], first: int, joint: int, chain: list[int], result: list[tuple[int, ...]]
 ) -> None:
     """Add the chains that go on from ``joint`` with ``chain`` behind it; ``first`` is the first bone of ``pairs``."""
     out = [n for n in range(first, len(pairs)) if pairs[n][0] == joint]
     if not out and len(chain) > 1:
-        found.append(tuple(chain))
+        result.append(tuple(chain))
     for n, limb in enumerate(out):
-        _follow(pairs, first, pairs[limb][1], [*(chain if n == 0 else chain[-1:]), limb], found)
+        _follow(pairs, first, pairs[limb][1], [*(chain if n == 0 else chain[-1:]), limb], result)
 
 
 class Stretch(NamedTuple):
@@ -104,13 +104,13 @@ def stretch(samples: np.ndarray, truth: np.ndarray, limbs: Limbs) -> Stretch:
         raise MotionloomError("a limb of the real motion has no length, so nothing can be given in percent of it.")
     length = _lengths(s, limbs)
     change = np.diff(length, axis=1)
-    found = (
+    errors = (
         np.abs(length.mean(axis=1) - real),
         np.sqrt(np.square(length - real).mean(axis=1)),
         np.abs(change).mean(axis=1),
         np.sqrt(np.square(change).mean(axis=1)),
     )
-    return Stretch(*(float(100 * (values / real).mean()) for values in found))
+    return Stretch(*(float(100 * (values / real).mean()) for values in errors))
 
 
 def angle_error(samples: np.ndarray, truth: np.ndarray, limbs: Limbs) -> float:
@@ -179,15 +179,15 @@ def seam(past: np.ndarray, samples: np.ndarray, fps: float) -> Seam:
 
 
 def as_poses(values: np.ndarray, dims: int, what: str, *, frames: int = 1) -> Array:
-    found = np.asarray(values)
-    if found.ndim != dims or found.shape[-1] != 3 or found.size == 0 or found.dtype.kind != "f":
+    poses = np.asarray(values)
+    if poses.ndim != dims or poses.shape[-1] != 3 or poses.size == 0 or poses.dtype.kind != "f":
         axes = "(samples, frames, joints, 3)" if dims == 4 else "(frames, joints, 3)"
-        raise MotionloomError(f"{what} must be places {axes} in metres, not {found.dtype} {found.shape}.")
-    if found.shape[-3] < frames:
-        raise MotionloomError(f"{what} must have {frames} frames or more to be measured, not {found.shape[-3]}.")
-    if not np.isfinite(found).all():
+        raise MotionloomError(f"{what} must be places {axes} in metres, not {poses.dtype} {poses.shape}.")
+    if poses.shape[-3] < frames:
+        raise MotionloomError(f"{what} must have {frames} frames or more to be measured, not {poses.shape[-3]}.")
+    if not np.isfinite(poses).all():
         raise MotionloomError(f"{what} hold numbers that are not finite: check where they come from.")
-    return np.asarray(found, dtype=np.float64)
+    return np.asarray(poses, dtype=np.float64)
 
 
 def as_window(samples: np.ndarray, real: np.ndarray, *, frames: int = 1) -> tuple[Array, Array]:

@@ -57,7 +57,7 @@ def realism(positions: np.ndarray, fps: float) -> dict[str, float]:
 
 
 def average(clips: Sequence[Array], fps: float) -> dict[str, float]:
-    """Mean of each number over clips, weighted by length; the median where the number says ``typical``."""
+    """Mean of each number over clips, weighted by length; the median where the number is ``typical``."""
     if not clips:
         return {number.name: float("nan") for number in NUMBERS}
     rows = [realism(clip, fps) for clip in clips]

@@ -23,15 +23,15 @@ _LARGEST = 1e100
 
 def embeddings(values: ArrayLike, name: str, *, rows: int = 1) -> Array:
     """``values`` as (n, d) float64 with at least ``rows`` rows of usable numbers; ``name`` is for the complaint."""
-    found = np.asarray(values)
-    if found.ndim != 2 or found.shape[1] == 0 or found.dtype.kind not in "fiu":
-        raise MotionloomError(f"{name} must be numbers (rows, dimensions), not {found.dtype} {found.shape}.")
-    if len(found) < rows:
-        raise MotionloomError(f"{name} has {len(found)} rows where at least {rows} are needed: measure more motions.")
-    found = found.astype(np.float64)
-    if not (np.abs(found) < _LARGEST).all():
+    points = np.asarray(values)
+    if points.ndim != 2 or points.shape[1] == 0 or points.dtype.kind not in "fiu":
+        raise MotionloomError(f"{name} must be numbers (rows, dimensions), not {points.dtype} {points.shape}.")
+    if len(points) < rows:
+        raise MotionloomError(f"{name} has {len(points)} rows where at least {rows} are needed: measure more motions.")
+    points = points.astype(np.float64)
+    if not (np.abs(points) < _LARGEST).all():
         raise MotionloomError(f"{name} holds numbers that are not finite or beyond {_LARGEST:g}: check the evaluator.")
-    return found
+    return points
 
 
 def r_precision(texts: ArrayLike, motions: ArrayLike, *, top: int = 3, batch: int | None = 32) -> Array:
@@ -41,7 +41,7 @@ def r_precision(texts: ArrayLike, motions: ArrayLike, *, top: int = 3, batch: in
     takes the whole set as one. The number depends on the batch size: chance is k / batch.
     Motions exactly as near as the own one (within rounding) count as in random order among themselves: of s nearer
     ones and e as near, the own one is in the first k with chance (k - s) / (e + 1). Without ties that is the published
-    count; with equal embeddings it is chance, where sorting alone could say anything up to 100 %.
+    count; with equal embeddings it is chance, where sorting alone could give anything up to 100 %.
     """
     t, m = _pairs(texts, motions, batch)
     size = len(t) if batch is None else batch
@@ -64,7 +64,7 @@ def matching_distance(texts: ArrayLike, motions: ArrayLike, *, batch: int | None
 def diversity(motions: ArrayLike, *, pairs: int = 300, seed: int = 0) -> float:
     """Mean distance of ``pairs`` random pairs of (n, d) motions; good where it is near that of real motions.
 
-    Both members are drawn without repetition, each for itself, so that a motion may meet itself (as published).
+    Both members are sampled without repetition, each for itself, so that a motion may meet itself (as published).
     """
     m = embeddings(motions, "the motions", rows=max(2, pairs))
     return diversity_of(m, *_draws(len(m), pairs, seed))
@@ -80,7 +80,7 @@ def diversity_of(motions: ArrayLike, first: Sequence[int] | NDArray, second: Seq
 def multimodality(motions: ArrayLike, *, pairs: int = 10, seed: int = 0) -> float:
     """Mean distance of ``pairs`` random pairs of motions of the same caption; up is better, after everything else.
 
-    ``motions`` is (captions, samples, d); the drawn samples are the same for every caption (as published).
+    ``motions`` is (captions, samples, d); the sampled pairs are the same for every caption (as published).
     """
     samples = _captions(motions).shape[1]
     if samples < max(2, pairs):
@@ -177,11 +177,11 @@ def fid_bias(real: ArrayLike, count: int, *, other: int | None = None, repeats: 
     if min(count, rest) < 2 or repeats < 1:
         raise MotionloomError(f"a bias needs 2 rows a side and one draw, not {count}, {rest} and {repeats}.")
     rows = embeddings(real, "the real set", rows=count + rest)
-    rng, found = np.random.default_rng(seed), []
+    rng, values = np.random.default_rng(seed), []
     for _ in range(repeats):
         order = rng.permutation(len(rows))
-        found.append(fid(rows[order[:count]], rows[order[count : count + rest]]))
-    return float(np.mean(found))
+        values.append(fid(rows[order[:count]], rows[order[count : count + rest]]))
+    return float(np.mean(values))
 
 
 def _spread(rows: Array) -> tuple[Array, Array]:

@@ -35,8 +35,8 @@ def skate(positions: ArrayLike, fps: float, *, floor: float = 0.0) -> Skate:
     if not (np.isfinite(fps) and fps > 0):
         raise MotionloomError(f"frames per second must be a positive number, not {fps}.")
     p = joints(np.asarray(positions)[None], 2)[0]
-    found = physics.foot_skate(p, fps, floor=floor)
-    return Skate(found.ratio, found.contact_speed, slide(p))
+    feet = physics.foot_skate(p, fps, floor=floor)
+    return Skate(feet.ratio, feet.contact_speed, slide(p))
 
 
 def slide(positions: ArrayLike, *, floor: float | None = None) -> float:

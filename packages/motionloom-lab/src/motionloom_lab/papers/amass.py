@@ -1,6 +1,6 @@
 """AMASS as stochastic prediction is measured on it: the protocol of BeLFusion (Barquero et al., ICCV 2023).
 
-Reads AMASS as distributed, or joint places that somebody made of it with the body model; see `read_amass`.
+Reads AMASS as distributed, or joint places computed from it with the body model; see `read_amass`.
 """
 
 import csv
@@ -61,8 +61,8 @@ def read_amass(
 
     The folder has AMASS's data sets as distributed (``<data set>/<subject>/<recording>_poses.npz``, SMPL+H G). The body
     model has a licence of its own and is not here, so **these give the joints of the uniform person**, turned as
-    recorded: figures on them are not those of published systems, and the protocol's licence line says so. Or it has
-    the places that somebody made with the body model, under the same names: ``.npy`` of (frames, 22, 3), or ``.npz``
+    recorded: figures on them are not those of published systems, as the protocol's licence line notes. Or it has
+    the places computed with the body model, under the same names: ``.npy`` of (frames, 22, 3), or ``.npz``
     with ``positions`` or ``joints`` of that shape and, if it is not 60, ``fps``; metres, +Z up. Where a recording is
     there in both forms the places are read. Every ``round(fps / 60)``-th frame is kept, as published.
 
@@ -87,8 +87,8 @@ def read_amass(
     uniform = False
     for name, place in sets:
         say(f"reading {name}")
-        for read, modelled in _recordings(name, place, say):
-            recordings.append(read)
+        for recording, modelled in _recordings(name, place, say):
+            recordings.append(recording)
             uniform |= not modelled
     licence = f"{AMASS_LICENCE}; {UNIFORM}" if uniform else AMASS_LICENCE
     test = [r for r in recordings if r.split == "test"]
@@ -112,13 +112,13 @@ def read_amass(
 
 def _set_folders(folder: Path) -> list[tuple[str, Path]]:
     inner = folder / "amass"
-    found = [
+    sets = [
         (name, place)
         for base in ((inner, folder) if inner.is_dir() else (folder,))
         for place in sorted(base.iterdir())
         if place.is_dir() and (name := set_name(place.name)) is not None
     ]
-    return list({name: (name, place) for name, place in reversed(found)}.values())[::-1]
+    return list({name: (name, place) for name, place in reversed(sets)}.values())[::-1]
 
 
 # Recordings
@@ -140,12 +140,14 @@ def _recordings(name: str, place: Path, say: Say) -> Iterator[tuple[Recording, b
 
 
 def _places(path: Path) -> tuple[NDArray[np.float32], bool]:
-    """(frames, 22, 3) metres, +Y up, at 60 Hz, and whether they were made with the body model."""
+    """(frames, 22, 3) metres, +Y up, at 60 Hz, and whether they are of the body model."""
     if path.suffix == ".npz" and "poses" in _members(path):
         motion = babel.read_amass(path)
         step = _step(motion.fps)
-        kept = replace(motion, root=motion.root[::step], rotations=motion.rotations[::step]).positions()
-        return (kept[..., [2, 1, 0]] * [-1.0, 1.0, 1.0]).astype(np.float32), False  # the reader keeps x, this y, z, x
+        positions = replace(motion, root=motion.root[::step], rotations=motion.rotations[::step]).positions()
+        return (positions[..., [2, 1, 0]] * [-1.0, 1.0, 1.0]).astype(
+            np.float32
+        ), False  # the reader keeps x, this y, z, x
     places, fps = _positions_of(path)
     if places.ndim != 3 or places.shape[1:] != (22, 3) or not len(places) or places.dtype.kind != "f":
         raise MotionloomError(
@@ -192,18 +194,18 @@ def _listed(path: Path, recordings: Sequence[Recording], say: Say) -> tuple[tupl
         for key in {r.name, f"{r.action}/{r.name.rsplit('/', 1)[-1]}"}:
             by_key.setdefault(key, []).append(r)
     rows = _rows(path)
-    seen: Counter[tuple[str, int]] = Counter()
-    found: list[tuple[str, int]] = []
+    counts: Counter[tuple[str, int]] = Counter()
+    windows: list[tuple[str, int]] = []
     for key, first in rows:
         there = [r.name for r in by_key.get(key, ()) if len(r.positions) >= first + OBSERVED + FUTURE]
-        if seen[key, first] < len(there):
-            found.append((there[seen[key, first]], first))
-        seen[key, first] += 1
-    if not found:
+        if counts[key, first] < len(there):
+            windows.append((there[counts[key, first]], first))
+        counts[key, first] += 1
+    if not windows:
         raise MotionloomError(f"none of the {len(rows)} windows of {path} is in the test data sets that are there")
-    if len(found) < len(rows):
-        say(f"{len(rows) - len(found)} of the {len(rows)} windows of {path.name} are not there and are left out")
-    return tuple(found)
+    if len(windows) < len(rows):
+        say(f"{len(rows) - len(windows)} of the {len(rows)} windows of {path.name} are not there and are left out")
+    return tuple(windows)
 
 
 def _rows(path: Path) -> list[tuple[str, int]]:

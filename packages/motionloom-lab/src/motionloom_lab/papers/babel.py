@@ -1,13 +1,13 @@
 """BABEL as distributed: label files beside AMASS recordings, to training pairs of the BABEL representation.
 
-BABEL (Punnakkal et al., CVPR 2021) says in ``train.json`` and ``val.json`` what is done from second to second in
+BABEL (Punnakkal et al., CVPR 2021) has in ``train.json`` and ``val.json`` what is done from second to second in
 recordings of AMASS (Mahmood et al., ICCV 2019), which are .npz files of SMPL-H poses. Both have licences of their own.
 
 A folder holds ``train.json`` and/or ``val.json`` (or the release's own folder with them), and the recordings under
 their ``feat_p`` paths, as in ``CMU/CMU/28/28_11_poses.npz``, in the folder itself or in ``amass``; the doubled name of
-the collection, which not every way of unpacking makes, may be single.
+the collection, which not every way of unpacking gives, may be single.
 
-Pairs are made as for PriorMDM's BABEL models ("separate pairs"): see `pairs` and `items`.
+Pairs are those of PriorMDM's BABEL models ("separate pairs"): see `pairs` and `items`.
 """
 
 import math
@@ -60,12 +60,12 @@ class Segment:
 
     @property
     def is_transition(self) -> bool:
-        """Whether annotators say that here one action becomes another."""
+        """Whether it is labelled as one action becoming another."""
         return self.text.lower() == "transition" or "transition" in self.acts
 
     @property
     def is_calibration(self) -> bool:
-        """Whether it shows a T-pose or an A-pose, which nobody asks for."""
+        """Whether it shows a T-pose or an A-pose, which nobody requests."""
         return any(name.lower().replace("-", " ").strip() in _POSES for name in (self.text, *self.acts))
 
 
@@ -120,17 +120,17 @@ def is_babel(folder: Path) -> bool:
 
 
 def _label_files(folder: Path) -> dict[str, Path]:
-    found = {s: [p for p in (folder, folder / _RELEASE) if (p / f"{s}.json").is_file()] for s in ("train", "val")}
-    return {split: places[0] / f"{split}.json" for split, places in found.items() if places}
+    roots = {s: [p for p in (folder, folder / _RELEASE) if (p / f"{s}.json").is_file()] for s in ("train", "val")}
+    return {split: places[0] / f"{split}.json" for split, places in roots.items() if places}
 
 
 def find_recordings(folder: Path | str, *, splits: Sequence[str] = ("train", "val")) -> list[Recording]:
-    """What the label files of a folder say; raises MotionloomError where there are none or one is not BABEL's."""
+    """The content of a folder's label files; raises MotionloomError where there are none or one is not BABEL's."""
     folder = Path(folder)
     files = _label_files(folder)
     if not any(split in files for split in splits):
-        wanted = " or ".join(f"{split}.json" for split in splits)
-        raise MotionloomError(f"{folder} has no {wanted}; name a folder with BABEL's label files")
+        names = " or ".join(f"{split}.json" for split in splits)
+        raise MotionloomError(f"{folder} has no {names}; name a folder with BABEL's label files")
     return [recording for split in splits if split in files for recording in read_labels(files[split], split)]
 
 
@@ -162,9 +162,9 @@ def _recording(number: str, split: str, entry: dict[str, Any]) -> Recording:
     if not isinstance(place, str) or not place.endswith(".npz") or not place.isprintable():
         raise ValueError("its feat_p is no path of an .npz file")
     parts = [_segment(label) for label in _labels(entry.get("frame_ann"))]
-    kept = sorted((s for s in parts if s.end > s.start and s.text), key=lambda s: (s.start, s.end))
-    said = (_text(label) for label in _labels(entry.get("seq_ann")))
-    return Recording(f"babel_{number}", split, place, tuple(dict.fromkeys(t for t in said if t)), tuple(kept))
+    segments = sorted((s for s in parts if s.end > s.start and s.text), key=lambda s: (s.start, s.end))
+    texts = (_text(label) for label in _labels(entry.get("seq_ann")))
+    return Recording(f"babel_{number}", split, place, tuple(dict.fromkeys(t for t in texts if t)), tuple(segments))
 
 
 def _labels(annotation: dict[str, Any] | None) -> list[dict[str, Any]]:
@@ -175,10 +175,10 @@ def _labels(annotation: dict[str, Any] | None) -> list[dict[str, Any]]:
 
 
 def _text(label: dict[str, Any]) -> str:
-    said = label.get("proc_label") or label.get("raw_label") or ""
-    if not isinstance(said, str):
+    words = label.get("proc_label") or label.get("raw_label") or ""
+    if not isinstance(words, str):
         raise ValueError("a label is not text")
-    plain = " ".join(said.split())
+    plain = " ".join(words.split())
     check_caption(plain)
     return plain
 
@@ -197,7 +197,7 @@ def _segment(label: dict[str, Any]) -> Segment:
 
 
 def find_motion(folder: Path | str, recording: Recording) -> Path:
-    """The .npz file of a recording; raises MotionloomError where it is missing or its path leads out of the folder."""
+    """The .npz file of a recording; raises MotionloomError where it is missing or its path is outside of the folder."""
     folder = Path(folder)
     first, _, rest = recording.place.partition("/")
     single = rest if rest.startswith(f"{first}/") else recording.place
@@ -212,7 +212,7 @@ def find_motion(folder: Path | str, recording: Recording) -> Path:
 def read_amass(path: Path | str) -> Motion:
     """A recording of AMASS (SMPL-H, SMPL-X or SMPL poses) as a motion of the 22 body joints at its own frame rate.
 
-    The rotations are kept, +Z up becomes +Y up, and the root stands where ``trans`` says: without the body model, whose
+    The rotations are kept, +Z up becomes +Y up, and the root is at ``trans``: without the body model, whose
     files have a licence of their own, nobody knows the person's size, so the bones are the uniform person's.
     Reads ``poses`` (frames, 66 or more) rotation vectors, ``trans`` (frames, 3) metres, ``mocap_framerate`` or
     ``mocap_frame_rate``. Raises MotionloomError, naming the file, for anything else.
@@ -244,7 +244,7 @@ def read_amass(path: Path | str) -> Motion:
 def at_30(motion: Motion) -> Motion:
     """30 fps by index interpolation, as published: frame k is the recorded frame at (rounded down) its even share.
 
-    ``int(frames * 30 / fps)`` frames, evenly from the first to the last; nothing between two frames is made up.
+    ``int(frames * 30 / fps)`` frames, evenly from the first to the last; nothing between two frames is interpolated.
     """
     count = max(int(len(motion) * FPS / motion.fps + 1e-9), 1)
     at = np.linspace(0, len(motion) - 1, count).astype(int)
@@ -259,12 +259,12 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
 
     Two actions make a pair where one ends within the other, or a frame apart: their overlap is the transition. And they
     make one where a stretch labelled as a transition begins at or within the first and ends at or within the second.
-    A stretch that lies within another is not followed by it and makes none. Raises MotionloomError for more pairs than
+    A stretch that lies within another is not followed by it and gives none. Raises MotionloomError for more pairs than
     anybody labels.
     """
     known = [s for s in segments if not s.is_calibration]
     actions = [s for s in known if not s.is_transition]
-    made = [
+    result = [
         Pair(
             (a.text, b.text),
             (a.start, min(b.start, a.end)),
@@ -277,13 +277,13 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
     for t in (s for s in known if s.is_transition):
         before = [a for a in actions if a.start < t.start <= a.end + TOUCH and a.end <= t.end]
         after = [b for b in actions if t.start <= b.start <= t.end + TOUCH and b.end > t.end]
-        if len(made) + len(before) * len(after) > _MAX_PAIRS:
+        if len(result) + len(before) * len(after) > _MAX_PAIRS:
             raise MotionloomError(f"a recording's labels make more than {_MAX_PAIRS:,} pairs; fetch the file again")
-        made += [
+        result += [
             Pair((a.text, b.text), (a.start, t.start), (t.start, t.end), (t.end, b.end))
             for a, b in product(before, after)
         ]
-    return list(dict.fromkeys(made))
+    return list(dict.fromkeys(result))
 
 
 def items(
@@ -302,7 +302,7 @@ def items(
     if motion.fps != FPS:
         raise MotionloomError(f"items are cut at {FPS:g} frames per second and {recording.name} has {motion.fps:g}")
     stretches = dict.fromkeys(stretch for pair in pairs(recording.segments) for stretch in _stretches(pair))
-    for number, (said, start, stop, *transition) in enumerate(stretches):
+    for number, (label, start, stop, *transition) in enumerate(stretches):
         first, last = _frame(start, len(motion)), _frame(stop, len(motion))
         if last - first > longest + SLACK and crop is not None:
             first += int(crop.integers(last - first - longest + 1))
@@ -312,7 +312,7 @@ def items(
         flags = np.zeros(len(motion), dtype=bool)
         flags[_frame(transition[0], len(motion)) : _frame(transition[1], len(motion))] = True
         name = f"{recording.name}_{number}"
-        yield BabelItem(name, said, encode(motion.frames(first, last)), flags[first:last])
+        yield BabelItem(name, label, encode(motion.frames(first, last)), flags[first:last])
 
 
 def _stretches(pair: Pair) -> Iterator[tuple[str, float, float, float, float]]:
@@ -332,7 +332,7 @@ def _frame(seconds: float, frames: int) -> int:
 def trimmed(
     item: BabelItem, rng: np.random.Generator, *, shortest: int = SHORTEST, longest: int = LONGEST
 ) -> BabelItem:
-    """The item without 0 to 4 of its last frames, drawn at random such that its length is within the limits."""
+    """The item without 0 to 4 of its last frames, at random such that its length is within the limits."""
     least, most = max(len(item) - longest, 0), max(min(SLACK, len(item) - shortest), 0)
     stop = len(item) - int(rng.integers(least, max(most, least) + 1))
     return replace(item, features=item.features[:stop], flags=item.flags[:stop])

@@ -29,7 +29,7 @@ def slerp_joined(motions: Sequence[Motion], *, blank: int = BLANK) -> Motion:
     for motion in motions[1:]:
         if motion.fps != joined.fps or motion.skeleton.names != joined.skeleton.names:
             raise MotionloomError("only motions of one skeleton and one frame rate can be joined; retarget or resample")
-        following = _put(motion, joined)
+        following = _place(motion, joined)
         amount = shares(blank)
         last, first = joined.rotations[-1], following.rotations[0]
         shape = (blank, *last.shape[:-1])
@@ -47,8 +47,8 @@ def slerp_joined(motions: Sequence[Motion], *, blank: int = BLANK) -> Motion:
     return joined
 
 
-def _put(motion: Motion, before: Motion) -> Motion:
-    """Turned and moved so that its first frame stands where the last one of ``before`` stood, facing the same way."""
+def _place(motion: Motion, before: Motion) -> Motion:
+    """Turned and moved so that its first frame is where the last one of ``before`` is, facing the same way."""
     end, start = before.frames(len(before) - 1, len(before)), motion.frames(0, 1)
     angle = float(heading(end.positions())[0] - heading(start.positions())[0])
     turn = np.array([np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0])

@@ -1,5 +1,5 @@
 """The skeletons of the prediction benchmarks, as published systems see them: from the root, +Z up, no way through
-the world; and whatever else ``benchmarks.toml`` says of them."""
+the world; and whatever else ``benchmarks.toml`` has of them."""
 
 from typing import Any
 

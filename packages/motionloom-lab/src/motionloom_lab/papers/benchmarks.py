@@ -48,16 +48,16 @@ def read_h36m(path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Say = 
 
     Train on S1, S5, S6, S7, S8 less what is held out for validation (`held_out`), test on S9 and S11: windows start at
     frames 0, 25, 50 ... and the one that would end with the last frame is left out, as published (5,168 windows of the
-    whole file). A class is an action without its number. ``say`` hears of subjects that are missing.
+    whole file). A class is an action without its number. ``say`` is called with subjects that are missing.
     Raises MotionloomError for a file that is missing, damaged, or of another form.
     """
     table = _subjects(path, H36M_TRAIN + H36M_TEST, "Human3.6M", say)
     recordings: list[Recording] = []
     for number, subject in enumerate(H36M_TRAIN + H36M_TEST):
         actions = sorted(table.get(subject, {}))
-        kept = held_out(len(actions), number)
+        val = held_out(len(actions), number)
         for order, action in enumerate(actions):
-            split = "test" if subject in H36M_TEST else "val" if order in kept else "train"
+            split = "test" if subject in H36M_TEST else "val" if order in val else "train"
             if split in splits:
                 places = _placed(table[subject][action], 32, f"{path}: {subject}, {action}")[:, H36M_JOINTS]
                 recordings.append(Recording(f"{subject}/{action}", subject, h36m_class(action), split, places))
@@ -87,13 +87,13 @@ def read_humaneva(path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Sa
     for number, subject in enumerate(subjects):
         whole = table.get(subject, {})
         good = sorted(a for a in whole if (subject, a) not in HUMANEVA_DROPPED and whole[a].shape[:1] >= (75,))
-        kept = held_out(len(good), number)
+        val = held_out(len(good), number)
         for order, action in enumerate(good):
-            split = "test" if subject.startswith("Validate") else "val" if order in kept else "train"
+            split = "test" if subject.startswith("Validate") else "val" if order in val else "train"
             if split in splits:
                 places = _placed(whole[action], 15, f"{path}: {subject}, {action}")
-                said = re.sub(r"( \d+)?( chunk\d+)?$", "", action)
-                recordings.append(Recording(f"{subject}/{action}", subject.split("/")[1], said, split, places))
+                label = re.sub(r"( \d+)?( chunk\d+)?$", "", action)
+                recordings.append(Recording(f"{subject}/{action}", subject.split("/")[1], label, split, places))
     return checked(path, Protocol("humaneva", 60.0, 15, 60, HUMANEVA_LAYOUT, tuple(recordings), HUMANEVA_LICENCE))
 
 
@@ -104,14 +104,14 @@ def held_out(actions: int, subject: int) -> set[int]:
     return {(2 * subject + 1 + 10 * k) % actions for k in range(count)}
 
 
-def _subjects(path: Path | str, wanted: tuple[str, ...], called: str, say: Say) -> Tables:
+def _subjects(path: Path | str, names: tuple[str, ...], title: str, say: Say) -> Tables:
     table = read_tables(path, "positions_3d")
-    missing = [name for name in wanted if name not in table]
-    if len(missing) == len(wanted):
+    missing = [name for name in names if name not in table]
+    if len(missing) == len(names):
         has = ", ".join(text.shown(name, 20) for name in list(table)[:8]) or "nobody"
-        raise MotionloomError(f"{path} has none of the subjects {', '.join(wanted)} of {called}; it has {has}")
+        raise MotionloomError(f"{path} has none of the subjects {', '.join(names)} of {title}; it has {has}")
     if missing:
-        say(f"{path} lacks {', '.join(missing)}, so figures on it are not those of the whole of {called}")
+        say(f"{path} lacks {', '.join(missing)}, so figures on it are not those of the whole of {title}")
     return table
 
 
@@ -169,18 +169,18 @@ def _recognised(path: Path, name: str | None) -> tuple[str, Path]:
         )
     if name in ("amass", "cmu", "own"):
         return name, path
-    found = [
+    files = [
         (kind, place)
         for kind in ("h36m", "humaneva")
         if name in (None, kind)
         for place in finished(path, f"data_3d_{kind}*.npz")
         if not place.stem.endswith("_test")
     ]
-    if len(found) > 1:
-        listed = " and ".join(place.name for _, place in found[:3])
-        raise MotionloomError(f"{path} has {listed}; name the one that is meant")
-    if found:
-        return found[0]
+    if len(files) > 1:
+        names = " and ".join(place.name for _, place in files[:3])
+        raise MotionloomError(f"{path} has {names}; name the one that is meant")
+    if files:
+        return files[0]
     if name is not None:
         raise MotionloomError(f"{path} has no data_3d_{name}*.npz; name the file itself")
     pack = (path / "manifest.csv").is_file()
@@ -199,5 +199,5 @@ def _file_kind(path: Path) -> str:
         return "humaneva"
     if subjects & set(H36M_TRAIN + H36M_TEST):
         return "h36m"
-    listed = ", ".join(text.shown(name, 20) for name in sorted(subjects)[:8]) or "nobody"
-    raise MotionloomError(f"{path} has the subjects of neither Human3.6M nor HumanEva-I; it has {listed}")
+    names = ", ".join(text.shown(name, 20) for name in sorted(subjects)[:8]) or "nobody"
+    raise MotionloomError(f"{path} has the subjects of neither Human3.6M nor HumanEva-I; it has {names}")

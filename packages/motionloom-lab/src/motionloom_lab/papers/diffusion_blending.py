@@ -60,7 +60,7 @@ def control_features(
         seeds: one per row; a row's motion depends on no other row.
         weights: one per network, a number or what broadcasts to the motions, or either by level (`diffusion.blend`);
             the mean by default. They are used as they are.
-        corrections: change each row's blended estimate before the given numbers are put in.
+        corrections: change each row's blended estimate before the given numbers are inserted.
         sampling: or single settings of it as keywords.
 
     Raises:
@@ -79,8 +79,8 @@ def control_features(
     weights = [1 / len(nets)] * len(nets) if weights is None else list(weights)
     if len(weights) != len(nets):
         raise MotionloomError(f"there are {len(weights)} weights for {len(nets)} networks; give one for each")
-    shown = mask if observed.noise_free else np.zeros_like(mask)
-    denoise = blended(nets, prior.condition(list(prompts)), known, shown, weights=weights, guidance=chosen.guidance)
+    visible = mask if observed.noise_free else np.zeros_like(mask)
+    denoise = blended(nets, prior.condition(list(prompts)), known, visible, weights=weights, guidance=chosen.guidance)
     if corrections is not None:
         denoise = corrected(denoise, corrections)
     return controlled(

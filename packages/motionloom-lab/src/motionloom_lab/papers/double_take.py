@@ -5,7 +5,7 @@ one batch. First take: neighbouring rows are averaged over a handshake after eve
 with the middles of both its intervals, is noised again and refined, held to the first take by a keep weight per frame.
 
 Two modes, both presets of `Keep`: ``published`` gives what the released code gives (keep the handshake, refine only
-the ramps, restart at 900 of 1000, padding attended); ``paper`` what the paper says. States are (repetitions *
+the ramps, restart at 900 of 1000, padding attended); ``paper`` what the paper describes. States are (repetitions *
 intervals, frames, features). What is above `double_take_features` is plain arrays over any denoiser.
 `motionloom.tasks.long` is the better default.
 """
@@ -44,7 +44,7 @@ HANDSHAKE = 20
 """Frames: one second of HumanML3D."""
 LEAST_MIDDLE = 10
 """Frames of an interval that neither a handshake nor a ramp may touch."""
-SEEN = 196
+LONGEST_CLIP = 196
 """Frames of the longest motion in HumanML3D: more in one interval than any prior trained on it saw."""
 LONGEST_ROW, MOST_FRAMES = 2000, 200_000
 
@@ -77,11 +77,11 @@ class Mode:
 
     keep: Keep
     ramp: int
-    """Frames, where nothing else is asked."""
+    """Frames, by default."""
     restart: float
     """Share of the levels from which the second take starts."""
     masked: bool
-    """Whether frames behind a row's end are kept out of attention."""
+    """Whether attention leaves out frames behind a row's end."""
 
 
 MODES: dict[str, Mode] = {
@@ -180,7 +180,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Takes:
-    """Everything that was made on the way; states as described above, transitions in place of intervals."""
+    """All intermediate results; states as described above, transitions in place of intervals."""
 
     first: State
     sandwich: State
@@ -299,7 +299,7 @@ def restarted(way: Sequence[int], schedule: Schedule, share: float) -> list[int]
 
 
 class TakeOptions(TypedDict, total=False):
-    """What of `double_take` may be asked otherwise."""
+    """Options of `double_take`."""
 
     solver: Solver
     """Ancestral sampling as published."""
@@ -324,15 +324,15 @@ def double_take(
     (repetitions * intervals, longest interval, features) at ``way[0]``. ``noise``: for either take.
     """
     solver, alone = options.get("solver", DDPM), options.get("second_take_only", False)
-    made = first_take(first, x, plan, way=way, schedule=schedule, noise=noise[0], solver=solver, join=not alone)
+    take = first_take(first, x, plan, way=way, schedule=schedule, noise=noise[0], solver=solver, join=not alone)
     if not plan.handshakes:
-        none = np.zeros((0, 0, made.shape[2]), made.dtype)
-        return Takes(made, none, np.zeros((0, 0), made.dtype), none, made, unfold(made, plan))
-    inside, weights = sandwiches(made, plan), keep_weights(plan, mode.keep)
+        none = np.zeros((0, 0, take.shape[2]), take.dtype)
+        return Takes(take, none, np.zeros((0, 0), take.dtype), none, take, unfold(take, plan))
+    inside, weights = sandwiches(take, plan), keep_weights(plan, mode.keep)
     later = restarted(way, schedule, mode.restart)
     refined = second_take(second, inside, weights, way=later, schedule=schedule, noise=noise[1], solver=solver)
-    rebuilt = rebuild(made, refined, plan)
-    return Takes(made, inside, weights, refined, rebuilt, unfold(rebuilt, plan))
+    rebuilt = rebuild(take, refined, plan)
+    return Takes(take, inside, weights, refined, rebuilt, unfold(rebuilt, plan))
 
 
 class TakeSettings(TypedDict, total=False):
@@ -358,7 +358,7 @@ def double_take_features(
     seed: int = 0,
     **settings: Unpack[TakeSettings],
 ) -> tuple[np.ndarray, list[int]]:
-    """One long motion. The second take's text is empty, and asked once per step.
+    """One long motion. The second take's text is empty, and evaluated once per step.
 
     Args:
         prior: the weights.
@@ -373,7 +373,7 @@ def double_take_features(
         Features (frames, 263), not standardised, and where each interval ends (`Plan.ends`).
 
     Raises:
-        MotionloomError: what cannot be asked.
+        MotionloomError: for requests that cannot be met.
     """
     steps, guidance = settings.get("steps", 1000), settings.get("guidance", GUIDANCE)
     solver, spacing = settings.get("solver", SOLVER), settings.get("spacing", SPACING)
@@ -397,10 +397,12 @@ def double_take_features(
     first = _with_text(prior, prompts, known[0], flags(plan), guidance)
     way, walker = levels(prior.schedule, steps, spacing=spacing), SOLVERS[solver]  # type: ignore[arg-type]
     if first_take_only:
-        made = unfold(first_take(first, x, plan, way=way, schedule=prior.schedule, noise=noise[0], solver=walker), plan)
+        motions = unfold(
+            first_take(first, x, plan, way=way, schedule=prior.schedule, noise=noise[0], solver=walker), plan
+        )
     else:
         second = _without_text(prior, joins, known[1])
-        made = double_take(
+        motions = double_take(
             first,
             second,
             x,
@@ -412,7 +414,7 @@ def double_take_features(
             solver=walker,
             second_take_only=second_take_only,
         ).unfolded
-    return prior.to_features(made[0]), plan.ends
+    return prior.to_features(motions[0]), plan.ends
 
 
 def _with_text(
@@ -442,8 +444,8 @@ def _check(prompts: Sequence[str], plan: Plan, *, seed: int, guidance: float, ne
         raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")
     if neither:
         raise MotionloomError("the first take only and the second take only exclude each other; ask for one of them")
-    if max(plan.lengths) > SEEN:
+    if max(plan.lengths) > LONGEST_CLIP:
         warnings.warn(
-            f"an interval has {max(plan.lengths)} frames; the data behind these weights have at most {SEEN}",
+            f"an interval has {max(plan.lengths)} frames; the data behind these weights have at most {LONGEST_CLIP}",
             stacklevel=3,
         )

@@ -1,7 +1,7 @@
 """Guo's published evaluator: the judge behind nearly every text-to-motion table on HumanML3D.
 
 Source: Guo et al., "Generating Diverse and Natural 3D Human Motions from Text", CVPR 2022. Weights, statistics and word
-vectors are the user's own files; `motionloom import finest.tar` makes one file of them.
+vectors are the user's own files; `motionloom import finest.tar` writes one file of them.
 """
 
 import itertools
@@ -129,14 +129,14 @@ class GuoEvaluator:
         """The frames that are read, a multiple of 4; MotionloomError where the motion is not of the right form."""
         if self.mean is None:
             raise MotionloomError("this evaluator has no statistics; import it again with --mean and --std")
-        given = np.asarray(features)
-        if given.ndim != 2 or given.shape[1] != len(self.mean) or len(given) < UNIT:
+        motion = np.asarray(features)
+        if motion.ndim != 2 or motion.shape[1] != len(self.mean) or len(motion) < UNIT:
             raise MotionloomError(
-                f"Guo's evaluator reads motions of {UNIT} or more frames by {len(self.mean)}; got {given.shape}"
+                f"Guo's evaluator reads motions of {UNIT} or more frames by {len(self.mean)}; got {motion.shape}"
             )
-        if given.dtype.kind != "f" or not np.isfinite(given).all():
+        if motion.dtype.kind != "f" or not np.isfinite(motion).all():
             raise MotionloomError("a motion has values that are no finite numbers; it cannot be judged")
-        return len(given) // UNIT * UNIT
+        return len(motion) // UNIT * UNIT
 
     def _prepared(self, features: np.ndarray) -> np.ndarray:
         """Standardised for the evaluator, without contacts, a whole number of snippets; float32."""
@@ -202,15 +202,15 @@ def read_published(
     if lists and not glove:
         raise MotionloomError(f"{lists} is of use only with word vectors; name them with --glove")
     lists = lists or _beside(folder / "word_vectorizer.py")
-    made = GuoEvaluator(
+    evaluator = GuoEvaluator(
         nets,
         read_array(mean) if mean else None,
         read_array(std) if std else None,
         read_words(glove, lists=lists) if glove else None,
         card={"file": path.name, "licence": "as its authors say", **(card or {})},
     )
-    _warn(made)
-    return made
+    _warn(evaluator)
+    return evaluator
 
 
 def save_guo(evaluator: GuoEvaluator, path: Path | str) -> Path:

@@ -67,10 +67,10 @@ class MovementEncoder(nn.Module):
 class SequenceEncoder(nn.Module):
     """A padded sequence to one point: linear, bidirectional GRU, both last states, two linear layers."""
 
-    def __init__(self, given: int, inner: int, joined: int, width: int) -> None:
-        """given: numbers per item; inner: width of the GRU; joined: width between the last two layers."""
+    def __init__(self, inputs: int, inner: int, joined: int, width: int) -> None:
+        """inputs: numbers per item; inner: width of the GRU; joined: width between the last two layers."""
         super().__init__()
-        self.input_emb = nn.Linear(given, inner)
+        self.input_emb = nn.Linear(inputs, inner)
         self.gru = nn.GRU(inner, inner, batch_first=True, bidirectional=True)
         self.hidden = nn.Parameter(torch.zeros(2, 1, inner))
         self.output_net = nn.Sequential(
@@ -78,7 +78,7 @@ class SequenceEncoder(nn.Module):
         )
 
     def forward(self, items: Tensor, lengths: Sequence[int]) -> Tensor:
-        """(rows, items, given) and the items that count in each row to (rows, width), in the order given."""
+        """(rows, items, inputs) and the items that count in each row to (rows, width), in the order given."""
         rows, most = items.shape[:2]
         if len(lengths) != rows or not all(1 <= n <= most for n in lengths):
             raise ValueError(f"{rows} rows of at most {most} items cannot have lengths {list(lengths)[:8]}")

@@ -83,7 +83,7 @@ class Words:
     def look_up(self, token: str) -> tuple[np.ndarray, int]:
         """The vector and the number of the part of speech (in `TAGS`) of a ``word/POS`` token.
 
-        A word without a vector is ``unk`` and OTHER; a listed word has its list's class, whatever its tag says.
+        A word without a vector is ``unk`` and OTHER; a listed word has its list's class, whatever its tag is.
         """
         word, slash, tag = token.rpartition("/")
         if not slash:
@@ -96,8 +96,8 @@ class Words:
 
 def padded(tokens: Sequence[str]) -> tuple[list[str], int]:
     """A caption's tokens as 22 items, and how many of them count: sos, at most 20 words, eos; then unk."""
-    said = [f"{START}/OTHER", *tokens[:LONGEST], f"{END}/OTHER"]
-    return said + [f"{UNKNOWN}/OTHER"] * (TOKENS - len(said)), len(said)
+    items = [f"{START}/OTHER", *tokens[:LONGEST], f"{END}/OTHER"]
+    return items + [f"{UNKNOWN}/OTHER"] * (TOKENS - len(items)), len(items)
 
 
 def read_words(path: Path | str, *, lists: Path | str | None = None) -> Words:
@@ -153,13 +153,13 @@ def read_special(path: Path | str) -> dict[str, str]:
         table = plain_json(text) if path.suffix == ".json" else _literal_lists(text)
         if not isinstance(table, dict) or not set(table) <= set(SPECIAL):
             raise ValueError(f"the classes are {', '.join(SPECIAL)}")
-        found: dict[str, str] = {}
+        classes: dict[str, str] = {}
         for name, words in table.items():
             if not isinstance(words, list | tuple | set) or not all(isinstance(word, str) for word in words):
                 raise ValueError(f"{name} is no list of words")
             for word in words:
-                found.setdefault(word, name)
-        return found
+                classes.setdefault(word, name)
+        return classes
     except (*DAMAGED, SyntaxError, MemoryError) as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{path} gives no lists of special words ({reason}); name word_vectorizer.py") from None
@@ -196,8 +196,8 @@ def read_flat(path: Path | str) -> list[Any] | dict[Any, Any]:
 
     Raises MotionloomError for a file that is missing, larger than 16 MiB, damaged, or holds anything else.
     """
-    found = read_plain_file(path, limit=_MAX_LIST_BYTES)
-    values = [*found, *found.values()] if isinstance(found, dict) else found
+    content = read_plain_file(path, limit=_MAX_LIST_BYTES)
+    values = [*content, *content.values()] if isinstance(content, dict) else content
     if not isinstance(values, list) or not all(type(value) in (str, int) for value in values):
         raise MotionloomError(f"{path} is not a plain list or table of words and is not opened; fetch it again")
-    return cast(list[Any] | dict[Any, Any], found)
+    return cast(list[Any] | dict[Any, Any], content)

@@ -45,7 +45,7 @@ PARTS = {
     "lower": (0, 6),
     "upper": (6, 16),
 }
-"""Joints [first, end) of the 16 told joints of Human3.6M, for part control (`fix_0` to `fix_6` in this order)."""
+"""Joints [first, end) of the 16 predicted joints of Human3.6M, for part control (`fix_0` to `fix_6` in this order)."""
 
 
 def published_levels(schedule: Schedule, steps: int) -> list[int]:
@@ -60,7 +60,7 @@ def published_levels(schedule: Schedule, steps: int) -> list[int]:
 
 
 def padded(observed: np.ndarray, frames: int, padding: Padding = "last") -> np.ndarray:
-    """Observed frames (rows, h, channels) and what stands for the others, (rows, ``frames``, channels).
+    """Observed frames (rows, h, channels) and what replaces the others, (rows, ``frames``, channels).
 
     "last": the last observed frame (the paper's). "zero": zeros; published code also destroyed the last observed frame
     in the caller's tensor, which this does not. "repeat": the observation again and again.
@@ -76,7 +76,7 @@ def padded(observed: np.ndarray, frames: int, padding: Padding = "last") -> np.n
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """Part control: joints that are known in all frames, a contiguous range of the told ones as published."""
+    """Part control: joints that are known in all frames, a contiguous range of the predicted ones as published."""
 
     signal: np.ndarray
     """(1, frames, channels)."""
@@ -94,12 +94,12 @@ class SwitchTarget:
 
 
 class Options(TypedDict, total=False):
-    """What of `published_completion` may be asked otherwise."""
+    """Options of `published_completion`."""
 
     steps: int
     """Of the sampler; 100 as published."""
     padding: Padding
-    """What stands for frames that were not observed; "last" as published."""
+    """What replaces frames that were not observed; "last" as published."""
     fixed: Fixed | None
     target: SwitchTarget | None
     complete: bool
@@ -220,21 +220,21 @@ def published_futures(
     and depends on no other row. Raises MotionloomError where the past is not as long as the predictor observes.
     """
     past = np.asarray(past, dtype=np.float64)
-    wanted = (predictor.observed, predictor.layout.joints, 3)
-    if past.ndim != 4 or past.shape[1:] != wanted or not np.isfinite(past).all():
-        raise MotionloomError(f"pasts must be finite (windows, {', '.join(map(str, wanted))}); got {past.shape}")
+    shape = (predictor.observed, predictor.layout.joints, 3)
+    if past.ndim != 4 or past.shape[1:] != shape or not np.isfinite(past).all():
+        raise MotionloomError(f"pasts must be finite (windows, {', '.join(map(str, shape))}); got {past.shape}")
     if min(count, rows) < 1:
         raise MotionloomError(f"there must be at least one future and one row at a time, not {count} and {rows}")
     place = predictor.layout.place(past[:, -1])
     conditioned = np.array(conditioned_samples(count, told_share, coin=coin))
     observed = predictor.layout.encode(past, place).astype(np.float32)
-    made: list[np.ndarray] = []
+    windows: list[np.ndarray] = []
     for first in range(0, len(past) * count, rows):
         index = np.arange(first, min(first + rows, len(past) * count))
         window, sample = index // count, index % count
         seeds = [row_seed(seed, w, i) for w, i in zip(window.tolist(), sample.tolist())]
-        made.append(_complete(predictor, observed[window], conditioned[sample], noise=row_noise(seeds), steps=steps))
-    future = np.concatenate(made)[:, predictor.observed :].astype(np.float64)
+        windows.append(_complete(predictor, observed[window], conditioned[sample], noise=row_noise(seeds), steps=steps))
+    future = np.concatenate(windows)[:, predictor.observed :].astype(np.float64)
     future = future.reshape(len(past), count, *future.shape[1:])
     return np.stack([predictor.layout.decode(future[:, i], place) for i in range(count)], axis=1)
 

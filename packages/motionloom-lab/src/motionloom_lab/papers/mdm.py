@@ -125,7 +125,7 @@ def _options(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Described:
-    """What `args.json` says that sampling needs."""
+    """What sampling needs of `args.json`."""
 
     schedule: str
     steps: int
@@ -145,25 +145,27 @@ def describe(published: Published, net: PriorNet) -> Described:
 
     Raises MotionloomError where an option contradicts the weights or is not usable.
     """
-    given, warnings = published.options, []
+    options, warnings = published.options, []
     for key, value in _ASSUMED.items():
-        if key not in given:
+        if key not in options:
             warnings.append(f"args.json does not say {key}; {value} is assumed")
-    said = _ASSUMED | {key: given[key] for key in _ASSUMED if key in given}
-    if said["arch"] != "trans_enc":
-        raise MotionloomError(f"args.json says arch {said['arch']!r}; only trans_enc checkpoints are read")
-    if said["noise_schedule"] not in ("cosine", "linear"):
-        raise MotionloomError(f"args.json says noise_schedule {said['noise_schedule']!r}; there are cosine and linear")
-    steps = said["diffusion_steps"]
+    settings = _ASSUMED | {key: options[key] for key in _ASSUMED if key in options}
+    if settings["arch"] != "trans_enc":
+        raise MotionloomError(f"args.json says arch {settings['arch']!r}; only trans_enc checkpoints are read")
+    if settings["noise_schedule"] not in ("cosine", "linear"):
+        raise MotionloomError(
+            f"args.json says noise_schedule {settings['noise_schedule']!r}; there are cosine and linear"
+        )
+    steps = settings["diffusion_steps"]
     if not isinstance(steps, int) or not 1 <= steps <= 100_000:
         raise MotionloomError(f"args.json says diffusion_steps {steps!r}; it must be a whole number from 1 to 100000")
     for key, size in (("layers", net.config.layers), ("latent_dim", net.config.width)):
-        if given.get(key, size) != size:
+        if options.get(key, size) != size:
             raise MotionloomError(
-                f"args.json says {key} {given[key]!r} where the weights have {size}: it is another file's"
+                f"args.json says {key} {options[key]!r} where the weights have {size}: it is another file's"
             )
-    data = str(given.get("dataset") or _DATA.get(net.config.features, "unknown"))
-    return Described(said["noise_schedule"], steps, data, tuple(warnings))
+    data = str(options.get("dataset") or _DATA.get(net.config.features, "unknown"))
+    return Described(settings["noise_schedule"], steps, data, tuple(warnings))
 
 
 _START, _END, _WHOLE = "seqTransEncoder_start.layers.", "seqTransEncoder_end.layers.", "seqTransEncoder.layers."
@@ -179,10 +181,10 @@ def is_pair(state: Mapping[str, Tensor]) -> bool:
 
 def adds_of(options: Mapping[str, Any]) -> Literal["all", "condition"]:
     """What the block corrects, by ``args.json``; raises MotionloomError for a function that is not read."""
-    said = options.get("multi_func", "in_both_out_cur")
-    if said not in _ADDS:
-        raise MotionloomError(f"args.json says multi_func {said!r}; {' and '.join(_ADDS)} are read")
-    return _ADDS[said]
+    name = options.get("multi_func", "in_both_out_cur")
+    if name not in _ADDS:
+        raise MotionloomError(f"args.json says multi_func {name!r}; {' and '.join(_ADDS)} are read")
+    return _ADDS[name]
 
 
 def from_published_pair(

@@ -3,7 +3,7 @@ Prediction with Multi-Range Transformers"), a baseline of prefix completion.
 
 For each person: a local encoder sees the cosine spectrum of the own last second, as differences of neighbouring rows; a
 global encoder sees every frame of everybody, with how near they are; a decoder with one query, the person's last pose,
-asks both and says the displacements of the next second as a spectrum. Longer futures are said second by second.
+attends to both and gives the displacements of the next second as a spectrum. Longer futures go second by second.
 
 Written from the paper's description. Here: 22 joints at 20 frames a second (there: 15 joints at 15), the places
 relative to the middle of all people's last roots (there: absolute in a centred scene), and no discriminator. The loss
@@ -41,7 +41,7 @@ class MrtConfig:
     """Sizes; the defaults are the paper's but for joints and frames."""
 
     frames: int = 20
-    """Frames of a second: seen, and said at once."""
+    """Frames of a second: seen, and predicted at once."""
     width: int = 128
     hidden: int = 1024
     layers: int = 3
@@ -116,7 +116,7 @@ class Mrt(nn.Module):
         return x
 
     def _all(self, places: Tensor) -> Tensor:
-        """(rows, people, frames, 66) to (rows, people * frames, width); who is who is not said, only when."""
+        """(rows, people, frames, 66) to (rows, people * frames, width); who is who is not encoded, only when."""
         x = self.global_in(places)
         x = (x + _times(x.shape[2], x)).flatten(1, 2)
         for layer in self.everybody:
@@ -157,8 +157,8 @@ class _Layer(nn.Module):
             m(z).unflatten(-1, (self.heads, -1)).transpose(1, 2)
             for m, z in ((self.query, x), (self.key, memory), (self.value, memory))
         )
-        seen = F.scaled_dot_product_attention(q, k, v, dropout_p=self.dropout.p if self.training else 0.0)
-        x = self.norm1(x + self.dropout(self.back(seen.transpose(1, 2).flatten(2))))
+        mixed = F.scaled_dot_product_attention(q, k, v, dropout_p=self.dropout.p if self.training else 0.0)
+        x = self.norm1(x + self.dropout(self.back(mixed.transpose(1, 2).flatten(2))))
         return self.norm2(x + self.dropout(self.shown(F.relu(self.hidden(x)))))
 
 
@@ -173,12 +173,12 @@ def completed(net: Mrt, past: np.ndarray, frames: int) -> np.ndarray:
     if past.ndim != 5 or past.shape[2] < second or past.shape[3:] != (JOINTS, 3) or frames < 1:
         raise MotionloomError(f"a completion needs pasts (rows, people, {second} or more, 22, 3); got {past.shape}")
     ones = next(net.parameters())
-    said = torch.as_tensor(past[:, :, -second:]).to(ones)
-    pieces, made = [], 0
-    while made < frames:
-        said = net(said)
-        pieces.append(said)
-        made += second
+    last = torch.as_tensor(past[:, :, -second:]).to(ones)
+    pieces, count = [], 0
+    while count < frames:
+        last = net(last)
+        pieces.append(last)
+        count += second
     after = torch.cat(pieces, dim=2)[:, :, :frames].cpu().numpy().astype(past.dtype)
     return np.concatenate([past, after], axis=2)
 
@@ -257,13 +257,13 @@ class Seconds:
         return turned(window - ground, float(rng.uniform(0, 2 * np.pi)))
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
-        """See `Objective.loss`; metres squared times 1000, which the gradient's largest norm is made for."""
+        """See `Objective.loss`; metres squared times 1000, which the gradient's largest norm is chosen for."""
         window, second = self.draw(seed, step, rows), self.net.config.frames
         starts = range(0, SECONDS * second, second)
         past = torch.cat([window[:, :, k : k + second] for k in starts])
-        wanted = torch.cat([window[:, :, k + second - 1 : k + 2 * second].diff(dim=2) for k in starts])
-        said = torch.cat([past[:, :, -1:], net(past)], dim=2).diff(dim=2)
-        return 1000 * ((said - wanted) ** 2).mean()
+        target = torch.cat([window[:, :, k + second - 1 : k + 2 * second].diff(dim=2) for k in starts])
+        estimate = torch.cat([past[:, :, -1:], net(past)], dim=2).diff(dim=2)
+        return 1000 * ((estimate - target) ** 2).mean()
 
 
 def train_mrt(run: Training, pairs: Sequence[Pair], config: MrtConfig | None = None) -> Path:
@@ -278,12 +278,12 @@ def train_mrt(run: Training, pairs: Sequence[Pair], config: MrtConfig | None = N
     objective = Seconds(net, chosen, device=run.world.device)
 
     def export(average: Average, step: int) -> None:
-        made = Mrt(net.config)
-        made.load_state_dict(average.weights)
+        result = Mrt(net.config)
+        result.load_state_dict(average.weights)
         notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "recordings": len(chosen)}
         licences = "; ".join(sorted({pair.licence for pair in chosen}))
         sources = ", ".join(sorted({pair.source for pair in chosen}))
-        MrtFile(made, licences, f"{len(chosen)} train pairs of {sources}", notes).save(run.place)
+        MrtFile(result, licences, f"{len(chosen)} train pairs of {sources}", notes).save(run.place)
 
     about = f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(chosen)} pairs and their mirror images"
     return run.run(objective, export, about)

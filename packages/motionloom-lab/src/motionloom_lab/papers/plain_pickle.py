@@ -60,7 +60,7 @@ NAMES: Mapping[tuple[str, str], str] = {
     ("numpy.core.numeric", "_frombuffer"): "frombuffer",
     ("numpy._core.numeric", "_frombuffer"): "frombuffer",
 }
-"""The names that plain pickles may say; each is a method ``make_...`` of the unpickler."""
+"""The names that plain pickles may have; each is a method ``make_...`` of the unpickler."""
 OPERATIONS = frozenset(
     {
         *("PROTO", "FRAME", "STOP", "MARK", "NONE", "NEWTRUE", "NEWFALSE"),
@@ -75,7 +75,7 @@ OPERATIONS = frozenset(
         *("GLOBAL", "STACK_GLOBAL", "REDUCE", "BUILD"),
     }
 )
-"""What is left of the unpickler; names and calls lead to methods of `PlainUnpickler` alone."""
+"""What is left of the unpickler; names and calls are methods of `PlainUnpickler` alone."""
 _SPARE = 16 << 20
 """Bytes that arrays and decoded texts may hold beyond twice the pickle's own: a few that are shared."""
 _DTYPE = re.compile(r"[|<>=]?(b1|[iu][1248]|f[248]|c8|c16|[SU][1-9][0-9]{0,4}|O8?)")
@@ -177,18 +177,18 @@ class PlainUnpickler(pickle._Unpickler):
 
     def value(self) -> Any:
         """The value of the pickle; the stream is left behind it. Raises one of `BROKEN` for whatever is wrong."""
-        found = self.load()
+        result = self.load()
         if self.stack or self.metastack:
             raise ValueError("it does not hold exactly one value")
         if self.unbuilt:
             raise ValueError("its array is incomplete")
-        _Unfolded(self.leaves).count(found)
-        return found
+        _Unfolded(self.leaves).count(result)
+        return result
 
-    # Names, and what is made of them.
+    # Names, and their values.
 
     def find_class(self, module: str, name: str) -> Any:
-        """The method that stands for a name; nothing named in the file is ever looked up."""
+        """The method that replaces a name; nothing named in the file is ever looked up."""
         if (module, name) not in self.names:
             raise ValueError(f"it names {module[:40]}.{name[:40]}")
         return getattr(self, f"make_{self.names[module, name]}")
@@ -240,7 +240,7 @@ class PlainUnpickler(pickle._Unpickler):
     # Operations that fill something.
 
     def load_build(self) -> None:
-        """BUILD: fills an array or a dtype that was made before, and nothing else."""
+        """BUILD: fills an unfinished array or dtype, and nothing else."""
         state = self.stack.pop()
         self.build(self.stack[-1], state)
 
@@ -269,19 +269,19 @@ class PlainUnpickler(pickle._Unpickler):
             raise ValueError("it is damaged or cut short")
         self.append(bytearray(data))
 
-    def build(self, built: Any, state: Any) -> None:
-        """Fill what was made before with what the file says of it."""
+    def build(self, target: Any, state: Any) -> None:
+        """Fill an unfinished array or dtype with its state in the file."""
         if not isinstance(state, tuple) or len(state) < 5:
             raise ValueError("its array is incomplete")
-        if isinstance(built, _Dtype):
-            if built.order is not None or state[1] not in ("<", ">", "|", "="):
+        if isinstance(target, _Dtype):
+            if target.order is not None or state[1] not in ("<", ">", "|", "="):
                 raise ValueError("its dtype cannot be read")
             if any(part is not None for part in state[2:5]):
                 raise ValueError("its array has fields")
-            built.order = state[1]
+            target.order = state[1]
             return
         _, shape, dtype, columns, data = state[:5]
-        if self.unbuilt.pop(id(built), None) is None:
+        if self.unbuilt.pop(id(target), None) is None:
             raise ValueError("it builds something that is no array")
         if not isinstance(shape, tuple) or len(shape) > 16 or not all(type(n) is int and n >= 0 for n in shape):
             raise ValueError("its array has no shape")
@@ -289,7 +289,7 @@ class PlainUnpickler(pickle._Unpickler):
             kind = self._objects(data, dtype, shape, by_columns=bool(columns))
         else:
             kind, data = self._numbers(data, dtype, shape)
-        built.__setstate__((1, shape, kind, bool(columns), data))
+        target.__setstate__((1, shape, kind, bool(columns), data))
 
     def _objects(self, data: list[Any], dtype: Any, shape: tuple[int, ...], *, by_columns: bool) -> np.dtype:
         if not isinstance(dtype, _Dtype) or not dtype.numpy().hasobject or (by_columns and len(shape) > 1):

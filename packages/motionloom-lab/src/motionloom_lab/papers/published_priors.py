@@ -50,8 +50,8 @@ def import_published(
     path = Path(path)
     published = read_published(path)
     net = from_published_pair(published.state)[0] if is_pair(published.state) else from_published(published.state)
-    said = describe(published, net)
-    for line in said.warnings:
+    about = describe(published, net)
+    for line in about.warnings:
         warn(line)
     features = net.config.features
     for label, values in (("mean", mean), ("std", std)):
@@ -63,10 +63,10 @@ def import_published(
         raise MotionloomError("the std has negative numbers; name the data set's Std.npy")
     options = _plain_options(published.options)
     notes = {"imported_from": path.name, "averaged_weights": published.averaged, "options": options}
-    card = Card(name or path.stem, licence or Card.licence, f"as published: {said.data}", notes)
+    card = Card(name or path.stem, licence or Card.licence, f"as published: {about.data}", notes)
     text = PublishedText("clip-77" if features == 135 else "clip")
     centre, spread = (np.array(values, dtype=np.float32) for values in (mean, std))
-    schedule = SCHEDULES[said.schedule](said.steps)
+    schedule = SCHEDULES[about.schedule](about.steps)
     return Prior(prior_session(net), schedule, centre, spread, text, card, FRAME_RATES.get(features, 20.0))
 
 
@@ -112,7 +112,7 @@ def is_humanmac(state: dict[str, Tensor]) -> bool:
 def import_humanmac(path: Path | str, *, name: str | None = None, licence: str | None = None) -> Predictor:
     """A published HumanMAC checkpoint (a plain state dict, ``.pt``) as a predictor of the variant `published`.
 
-    Its sizes tell the data set: Human3.6M (50 fps, 25 + 100 frames) or HumanEva-I (60 fps, 15 + 60 frames), cosine
+    Its sizes show the data set: Human3.6M (50 fps, 25 + 100 frames) or HumanEva-I (60 fps, 15 + 60 frames), cosine
     schedule of 1000 levels. Raises MotionloomError for anything but such weights.
     """
     path = Path(path)
@@ -124,20 +124,20 @@ def import_humanmac(path: Path | str, *, name: str | None = None, licence: str |
         )
     data, layout, fps, observed, frames = _BENCHMARKS[out.shape[0]]
     blocks = {key.split(".")[1] for key in state if key.startswith("temporal_decoder_blocks.")}
-    kept, width = embedding.shape
-    config = PredictorConfig(channels=layout.channels, kept=kept, layers=len(blocks), width=width)
-    if kept > frames:
-        raise MotionloomError(f"{path} has {kept} frequencies of {frames} frames, which there are not; fetch it again")
+    count, width = embedding.shape
+    config = PredictorConfig(channels=layout.channels, kept=count, layers=len(blocks), width=width)
+    if count > frames:
+        raise MotionloomError(f"{path} has {count} frequencies of {frames} frames, which there are not; fetch it again")
     with torch.device("meta"):
         net = TransLinear(config)
     fill(net, {key: value.float() for key, value in state.items()}, str(path))
-    zeros, ones = np.zeros((kept, layout.channels), np.float32), np.ones((kept, layout.channels), np.float32)
+    zeros, ones = np.zeros((count, layout.channels), np.float32), np.ones((count, layout.channels), np.float32)
     card = Card(name or path.stem, licence or Card.licence, f"as published: {data}", {"imported_from": path.name})
     return Predictor(
         predictor_session(net),
         SCHEDULES["cosine"](1000),
         layout,
-        Dct(frames, kept),
+        Dct(frames, count),
         observed,
         fps,
         "published",

@@ -2,10 +2,10 @@
 
 von Marcard et al., Recovering Accurate 3D Human Pose in the Wild, ECCV 2018. A sequence is a Python 2 pickle of lists
 and numpy arrays at 30 frames per second, read by `lab.papers.plain_pickle`, which runs nothing of it. The published
-data of ComMDM (Shafir et al., 2023) was made from these files by code that is not released; what is done here is ours:
+data of ComMDM (Shafir et al., 2023) was computed from these files by code that is not released; this is ours:
 
 * *Upright.* The axis along which heads are over ankles becomes +Y.
-* *Drift.* The paper says that the root "is often drifting which was partially fixable by reducing the drift of the
+* *Drift.* According to the paper the root "is often drifting which was partially fixable by reducing the drift of the
   camera from the drift of the root". The camera's path on the ground (smoothed over a second) is subtracted from both
   people alike, times the share of it that their planted feet go along with (least squares, 0 to 1). So a camera that
   follows two walkers takes nothing away, and the distance between the two never changes.
@@ -156,11 +156,7 @@ def _camera(content: dict, frames: int, path: Path) -> Array | None:
         flags = [np.asarray(one) for one in (valid if isinstance(valid, list) else [valid])]
     except ValueError:  # lists of several lengths
         flags = [np.empty(0)]
-    if (
-        flags is None
-        or len(poses) != frames
-        or any(flag.shape != (frames,) or flag.dtype.kind not in "biuf" for flag in flags)
-    ):
+    if len(poses) != frames or any(flag.shape != (frames,) or flag.dtype.kind not in "biuf" for flag in flags):
         raise MotionloomError(f"{path} is no 3DPW sequence: its camera has not one pose for each of {frames} frames")
     places = -np.einsum("fji,fj->fi", poses[:, :3, :3], poses[:, :3, 3])
     good = np.flatnonzero(np.all([flag.astype(bool) for flag in flags], axis=0)) if flags else np.arange(frames)
@@ -187,5 +183,5 @@ def _captions(folder: Path, name: str) -> tuple[str, ...]:
     except MotionloomError as error:
         reason = str(error)[:200]
         raise MotionloomError(f"{path} holds no captions ({reason}); it has one on each line") from None
-    said = (" ".join(line.partition("#")[0].split()) for line in lines)
-    return tuple(text for text in said if text and text.isprintable())
+    texts = (" ".join(line.partition("#")[0].split()) for line in lines)
+    return tuple(text for text in texts if text and text.isprintable())

@@ -1,6 +1,6 @@
 """Files of `torch.save`, read by `torch.load(weights_only=True)` behind a look at their names and sizes.
 
-Torch's own weights-only reader trusts what a file says of sizes, and calls a few things besides. So the pickle inside
+Torch's own weights-only reader trusts a file's sizes, and calls a few things besides. So the pickle inside
 is read first as `lab.papers.plain_pickle` reads all of them, with the few names that state dicts need: every tensor
 must lie within numbers that are there. An archive is then packed anew from the members that were looked at, so that
 torch reads the very bytes that were measured. Files of before torch 1.6 (a row of pickles, then the numbers) are read
@@ -79,7 +79,7 @@ def is_plain(value: Tensor) -> bool:
 
 
 def _checked_archive(data: bytes) -> io.BytesIO:
-    """The archive of the members that were looked at; ValueError where one is not what the pickle says of it."""
+    """The archive of the members that were looked at; ValueError where one is not as the pickle describes it."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = archive.infolist()
         if len(members) > MAX_MEMBERS or any(m.compress_type != zipfile.ZIP_STORED for m in members):
@@ -205,7 +205,7 @@ class _Look(PlainUnpickler):
             raise ValueError("a tensor reaches beyond its numbers")
         return _Part()
 
-    def build(self, built: Any, state: Any) -> None:
+    def build(self, target: Any, state: Any) -> None:
         """See `PlainUnpickler.build`; what an ordered dictionary has beside its entries (`_metadata`) is let be."""
-        if not (isinstance(built, dict) and isinstance(state, dict)):
-            super().build(built, state)
+        if not (isinstance(target, dict) and isinstance(state, dict)):
+            super().build(target, state)

@@ -22,7 +22,7 @@ CONTROLS = (REAL, "shuffled", "chance")
 CLOCKED = ("ms", "per_second", "memory")
 """Columns of suites about quality that a busier or another machine changes; the suite of speed is for these."""
 SUBJECT = ("weights", "files")
-"""Keys of a protocol that say what was measured rather than how; in the suite of the evaluator, itself as well."""
+"""Keys of a protocol that name what was measured rather than how; in the suite of the evaluator, itself as well."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def compare(before: Report, after: Report, *, anyway: bool = False) -> list[Diff
             f"the two {after.suite} reports were not measured alike: {'; '.join(differing)}; "
             "measure again alike, or compare --anyway"
         )
-    found = []
+    changes = []
     columns = {column.name: column for column in before.columns}
     for row in after.rows:
         old = None if row.measured_on else counterpart(row, before, after)
@@ -59,8 +59,8 @@ def compare(before: Report, after: Report, *, anyway: bool = False) -> list[Diff
                 a, b = old.values[column.name], row.values[column.name]
                 judged = column if is_judged(after.suite, row.name, column) else replace(column, better="")
                 verdict = judge(judged, a, b, reals=(_real(before, column), _real(after, column)))
-                found.append(Difference(after.suite, row.name, column, a, b, verdict))
-    return found
+                changes.append(Difference(after.suite, row.name, column, a, b, verdict))
+    return changes
 
 
 def counterpart(row: Row, before: Report, after: Report) -> Row | None:
@@ -95,24 +95,24 @@ def _real(report: Report, column: Column) -> Value | None:
 
 def differences_of_protocol(before: Report, after: Report) -> list[str]:
     """What differs in how two reports were measured, as ``name before -> after``."""
-    found = [] if before.suite == after.suite else [f"suite {before.suite} -> {after.suite}"]
+    lines = [] if before.suite == after.suite else [f"suite {before.suite} -> {after.suite}"]
     subject = (*SUBJECT, "evaluator") if before.suite == "evaluator" else SUBJECT
-    kept = [{k: v for k, v in report.protocol.items() if k not in subject} for report in (before, after)]
-    return found + _differing(kept[0], kept[1], "")
+    settings = [{k: v for k, v in report.protocol.items() if k not in subject} for report in (before, after)]
+    return lines + _differing(settings[0], settings[1], "")
 
 
 def _differing(a: Mapping[str, Any], b: Mapping[str, Any], where: str) -> list[str]:
-    found = []
+    lines = []
     for name in dict.fromkeys([*a, *b]):
-        said = f"{where}{name}"
+        path = f"{where}{name}"
         x, y = a.get(name), b.get(name)
         if x == y:
             continue
         if isinstance(x, Mapping) and isinstance(y, Mapping):
-            found += _differing(x, y, f"{said}.")
+            lines += _differing(x, y, f"{path}.")
         else:
-            found.append(f"{said} {_short(a, name)} -> {_short(b, name)}")
-    return found
+            lines.append(f"{path} {_short(a, name)} -> {_short(b, name)}")
+    return lines
 
 
 def _short(protocol: Mapping[str, Any], name: str) -> str:
@@ -175,11 +175,11 @@ def load(path: Path | str) -> dict[str, Report]:
         inside = finished(path, "*.json", "*/report.json")
         if not inside:
             raise MotionloomError(f"{path} holds no reports; name a report.json or a folder of SUITE.json files")
-        found = [reports.read(one) for one in inside]
+        every = [reports.read(one) for one in inside]
     else:
-        found = [reports.read(path)]
-    by_suite = {report.suite: report for report in found}
-    if len(by_suite) < len(found):
+        every = [reports.read(path)]
+    by_suite = {report.suite: report for report in every}
+    if len(by_suite) < len(every):
         raise MotionloomError(f"{path} holds two reports of one suite; name one of them")
     return by_suite
 
@@ -195,20 +195,20 @@ def compare_all(before: Path | str, after: Path | str, *, anyway: bool = False) 
         raise MotionloomError(
             f"{before} and {after} have no suite in common: {', '.join(sorted(a))} there, {', '.join(sorted(b))} here"
         )
-    found = [one for suite in shared for one in compare(a[suite], b[suite], anyway=anyway)]
-    return found, sorted(set(a) ^ set(b))
+    differences = [one for suite in shared for one in compare(a[suite], b[suite], anyway=anyway)]
+    return differences, sorted(set(a) ^ set(b))
 
 
-def table(found: Sequence[Difference]) -> list[list[str]]:
+def table(differences: Sequence[Difference]) -> list[list[str]]:
     """Rows of text, the heading first."""
     rows = [["", "suite", "row", "number", "before", "after"]]
-    for one in found:
+    for one in differences:
         values = [reports.cell(one.column, value) for value in (one.before, one.after)]
         rows.append([one.verdict, one.suite, one.row, one.column.title, *values])
     return rows
 
 
-def encode(found: Sequence[Difference]) -> list[dict[str, Any]]:
+def encode(differences: Sequence[Difference]) -> list[dict[str, Any]]:
     """Plain data for JSON; an interval or number that is not finite is null."""
     return [
         {
@@ -221,7 +221,7 @@ def encode(found: Sequence[Difference]) -> list[dict[str, Any]]:
                 for name, v in (("before", one.before), ("after", one.after))
             },
         }
-        for one in found
+        for one in differences
     ]
 
 
@@ -229,13 +229,13 @@ def _or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def tally(found: Sequence[Difference]) -> str:
+def tally(differences: Sequence[Difference]) -> str:
     """How many numbers got which verdict, in a sentence, and how many would by chance."""
-    counts = {name: sum(one.verdict == name for one in found) for name in ("worse", "better", "other", "same")}
-    unknown = len(found) - sum(counts.values())
-    said = f"{counts['worse']} worse and {counts['better']} better than the intervals explain"
-    said += f", {counts['same']} within them"
-    said += f", {counts['other']} changed where neither way is better" if counts["other"] else ""
-    said += f", {unknown} measured only once and not judged" if unknown else ""
-    judged = len(found) - unknown
-    return f"{said}; of {judged} numbers about {judged / 20:.1f} leave a 95 % interval by chance"
+    counts = {name: sum(one.verdict == name for one in differences) for name in ("worse", "better", "other", "same")}
+    unknown = len(differences) - sum(counts.values())
+    sentence = f"{counts['worse']} worse and {counts['better']} better than the intervals explain"
+    sentence += f", {counts['same']} within them"
+    sentence += f", {counts['other']} changed where neither way is better" if counts["other"] else ""
+    sentence += f", {unknown} measured only once and not judged" if unknown else ""
+    judged = len(differences) - unknown
+    return f"{sentence}; of {judged} numbers about {judged / 20:.1f} leave a 95 % interval by chance"

@@ -23,7 +23,7 @@ def plain(rows: Sequence[Sequence[str]]) -> str:
 
 
 def check_report(path: Path) -> Path:
-    """The path, if a report can be written there, whose folders may be missing: ask before long work."""
+    """The path, if a report can be written there, whose folders may be missing: a check before long work."""
     check_place(path, folders=True)
     return path
 

@@ -29,21 +29,21 @@ def draw(report: Report, folder: Path) -> list[Path]:
     """Write ``report.png`` (``report-2.png`` and so on for many metrics) with what was measured here, ``steps.png``
     where rows differ in steps, and ``published.png`` beside what others measured on other data, often of another scale.
 
-    Nothing is drawn of fewer than two rows. The folder must exist.
+    There is no picture of fewer than two rows. The folder must exist.
     """
     here = [row for row in report.rows if not row.measured_on][:MOST_ROWS]
     elsewhere = [row for row in report.rows if row.measured_on][:MOST_ROWS]
-    written, columns = [], _drawable(report, here)
+    paths, columns = [], _drawable(report, here)
     for page, first in enumerate(range(0, len(columns), PANELS), start=1):
         name = f"report-{page}.png" if page > 1 else "report.png"
-        written.append(_points(report, columns[first : first + PANELS], here, folder / name))
+        paths.append(_points(report, columns[first : first + PANELS], here, folder / name))
     lines = by_steps(here)
-    if lines and (shown := _drawable(report, [row for points in lines.values() for _, row in points])):
-        written.append(_lines(report, shown[:PANELS], lines, folder / "steps.png"))
+    if lines and (plots := _drawable(report, [row for points in lines.values() for _, row in points])):
+        paths.append(_lines(report, plots[:PANELS], lines, folder / "steps.png"))
     beside = {name for row in elsewhere for name in row.values}
-    if shown := [c for c in _drawable(report, [*here, *elsewhere]) if c.name in beside]:
-        written.append(_points(report, shown[:PANELS], [*here, *elsewhere], folder / "published.png"))
-    return written
+    if plots := [c for c in _drawable(report, [*here, *elsewhere]) if c.name in beside]:
+        paths.append(_points(report, plots[:PANELS], [*here, *elsewhere], folder / "published.png"))
+    return paths
 
 
 def _drawable(report: Report, rows: Sequence[Row]) -> list[Column]:
@@ -52,13 +52,13 @@ def _drawable(report: Report, rows: Sequence[Row]) -> list[Column]:
 
 
 def by_steps(rows: Sequence[Row]) -> dict[str, list[tuple[int, Row]]]:
-    """Rows measured here whose names say a number of steps, by the rest of the name; two different numbers or more."""
-    found: dict[str, list[tuple[int, Row]]] = {}
+    """Rows measured here whose names have a number of steps, by the rest of the name; two different numbers or more."""
+    groups: dict[str, list[tuple[int, Row]]] = {}
     for row in rows:
         match = STEPS.fullmatch(row.name) if not row.measured_on else None
         if match:
-            found.setdefault((match["what"] + match["rest"]).strip(" ,"), []).append((int(match["steps"]), row))
-    ordered = {name: sorted(points, key=lambda point: point[0]) for name, points in found.items()}
+            groups.setdefault((match["what"] + match["rest"]).strip(" ,"), []).append((int(match["steps"]), row))
+    ordered = {name: sorted(points, key=lambda point: point[0]) for name, points in groups.items()}
     return {name: points for name, points in ordered.items() if len({steps for steps, _ in points}) > 1}
 
 
@@ -116,8 +116,8 @@ def _points(report: Report, columns: Sequence[Column], rows: Sequence[Row], path
         axis.margins(x=0.08)
         axis.locator_params(axis="x", nbins=4)
     if sources:
-        listed = [f"[{k}] {_plain(source, 120)}" for k, source in enumerate(sources, start=1)]
-        figure.supxlabel("\n".join(["hatched: published", *listed]), fontsize=8, color="#5a6270")
+        lines = [f"[{k}] {_plain(source, 120)}" for k, source in enumerate(sources, start=1)]
+        figure.supxlabel("\n".join(["hatched: published", *lines]), fontsize=8, color="#5a6270")
     return _save(figure, report, path)
 
 
@@ -157,14 +157,14 @@ def _lines(report: Report, columns: Sequence[Column], lines: dict[str, list[tupl
     real = report.row(REAL)
     for axis, column in zip(axes, columns, strict=True):
         for colour, (name, points) in zip(colours, lines.items(), strict=False):
-            found = [(steps, row.values[column.name]) for steps, row in points if column.name in row.values]
-            found = [(steps, value) for steps, value in found if math.isfinite(value.mean)]
-            if not found:
+            series = [(steps, row.values[column.name]) for steps, row in points if column.name in row.values]
+            series = [(steps, value) for steps, value in series if math.isfinite(value.mean)]
+            if not series:
                 continue
-            spread = [value.interval if math.isfinite(value.interval) else 0.0 for _, value in found]
+            spread = [value.interval if math.isfinite(value.interval) else 0.0 for _, value in series]
             axis.errorbar(
-                [steps for steps, _ in found],
-                [value.mean for _, value in found],
+                [steps for steps, _ in series],
+                [value.mean for _, value in series],
                 yerr=spread,
                 color=colour,
                 marker="o",
@@ -197,19 +197,19 @@ def study(report: Report, path: Path) -> Path:
     rows = [row for row in here if row.name != REAL]
     figure, axes, _ = _grid(len(columns), width=2.9, height=2.3)
     for axis, column in zip(axes, columns, strict=True):
-        found = [(k, row.values[column.name].mean) for k, row in enumerate(rows) if column.name in row.values]
-        axis.plot([k for k, _ in found], [v for _, v in found], color=OURS, marker="o", markersize=4, linewidth=1.2)
+        series = [(k, row.values[column.name].mean) for k, row in enumerate(rows) if column.name in row.values]
+        axis.plot([k for k, _ in series], [v for _, v in series], color=OURS, marker="o", markersize=4, linewidth=1.2)
         real = report.row(REAL)
         if real and column.name in real.values:
             axis.axhline(real.values[column.name].mean, color=REALITY, linewidth=0.8, linestyle="--")
-        shown = range(0, len(rows), max(1, len(rows) // 8))
-        axis.set_xticks(list(shown), [_plain(rows[k].name, 20) for k in shown], rotation=40, ha="right", fontsize=7)
+        ticks = range(0, len(rows), max(1, len(rows) // 8))
+        axis.set_xticks(list(ticks), [_plain(rows[k].name, 20) for k in ticks], rotation=40, ha="right", fontsize=7)
         axis.set_title(_plain(column.title, 34) + ARROWS[column.better], fontsize=9, color=INK)
         axis.grid(color="#e4e7ec", linewidth=0.6)
     return _save(figure, report, path)
 
 
 def _plain(text: str, most: int) -> str:
-    """One line of at most ``most`` characters that matplotlib takes as it stands: no mathematics, no controls."""
+    """One line of at most ``most`` characters that matplotlib takes as it is: no mathematics, no controls."""
     line = "".join(c for c in " ".join(text.split()) if c.isprintable())
     return (line if len(line) <= most else line[: most - 1] + "…").replace("\\", "/").replace("$", "\\$")

@@ -107,14 +107,14 @@ class Report:
 
 
 def write(report: Report, folder: Path | str) -> Path:
-    """Write ``report.json``, ``report.md`` and the plots into ``folder`` (made where missing); the path of the JSON."""
-    from motionloom_lab.report import plots  # it draws these types
+    """Write ``report.json``, ``report.md`` and the plots into ``folder`` (missing or not); the path of the JSON."""
+    from motionloom_lab.report import plots  # it uses these types
 
     folder = Path(folder)
     path = check_report(folder / "report.json")
     pictures = plots.draw(report, folder)
-    shown = "".join(f"\n![{report.title}]({picture.name})\n" for picture in pictures)
-    write_text(folder / "report.md", markdown(report) + shown)
+    images = "".join(f"\n![{report.title}]({picture.name})\n" for picture in pictures)
+    write_text(folder / "report.md", markdown(report) + images)
     return write_json(path, encode(report))
 
 
@@ -129,8 +129,8 @@ def read(path: Path | str) -> Report:
     try:
         return decode(plain_json(text, finite=True))
     except DAMAGED as error:
-        said = error if isinstance(error, MotionloomError) else repr(error)
-        raise MotionloomError(f"{path} is not a report of motionloom evaluate ({said}); measure again") from None
+        reason = error if isinstance(error, MotionloomError) else repr(error)
+        raise MotionloomError(f"{path} is not a report of motionloom evaluate ({reason}); measure again") from None
 
 
 def encode(report: Report) -> dict[str, Any]:
@@ -154,23 +154,23 @@ def encode(report: Report) -> dict[str, Any]:
     }
 
 
-def decode(found: Any) -> Report:
+def decode(data: Any) -> Report:
     """The report of `encode`'s data, every size, type and name checked."""
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise MotionloomError(f"it has no format {FORMAT}")
-    suite = _text(found["suite"])
+    suite = _text(data["suite"])
     if not SLUG.fullmatch(suite):
         raise MotionloomError("the name of its suite is no plain word")
-    if not isinstance(found["protocol"], dict):
+    if not isinstance(data["protocol"], dict):
         raise MotionloomError("its protocol is no object")
-    columns = tuple(_column(c) for c in _list(found["columns"], MOST_COLUMNS))
+    columns = tuple(_column(c) for c in _list(data["columns"], MOST_COLUMNS))
     names = {c.name for c in columns}
-    rows = tuple(_row(r, names) for r in _list(found["rows"], MOST_ROWS))
+    rows = tuple(_row(r, names) for r in _list(data["rows"], MOST_ROWS))
     if len(names) != len(columns) or len({(r.name, r.measured_on) for r in rows}) != len(rows):
         raise MotionloomError("a column or a row is there twice")
-    notes = tuple(_text(note) for note in _list(found["notes"], MOST_ROWS))
-    protocol = _plain(found["protocol"])
-    return Report(suite, _text(found["title"]), _text(found["command"]), protocol, columns, rows, notes)
+    notes = tuple(_text(note) for note in _list(data["notes"], MOST_ROWS))
+    protocol = _plain(data["protocol"])
+    return Report(suite, _text(data["title"]), _text(data["command"]), protocol, columns, rows, notes)
 
 
 def markdown(report: Report) -> str:
@@ -226,13 +226,13 @@ def _split(report: Report) -> tuple[list[Row], list[Row]]:
 
 def _cells(report: Report, rows: Sequence[Row], *, bold: bool = False) -> list[list[str]]:
     """Rows of text, the heading first; a last column counts replications where any number has more than one."""
-    shown = [c for c in report.columns if any(c.name in row.values for row in rows)]
-    if len(rows) == 1 and len(shown) > WIDE:
-        return _turned(rows[0], shown)
-    best = {c.name: _best(report, c) for c in shown} if bold else {}
-    table, counts = [["", *(_line(c.title) + ARROWS[c.better] for c in shown)]], []
+    columns = [c for c in report.columns if any(c.name in row.values for row in rows)]
+    if len(rows) == 1 and len(columns) > WIDE:
+        return _turned(rows[0], columns)
+    best = {c.name: _best(report, c) for c in columns} if bold else {}
+    table, counts = [["", *(_line(c.title) + ARROWS[c.better] for c in columns)]], []
     for row in rows:
-        cells = {c.name: cell(c, row.values[c.name]) if c.name in row.values else "" for c in shown}
+        cells = {c.name: cell(c, row.values[c.name]) if c.name in row.values else "" for c in columns}
         table.append(
             [
                 _line(row.name),
@@ -240,16 +240,16 @@ def _cells(report: Report, rows: Sequence[Row], *, bold: bool = False) -> list[l
             ]
         )
         # a share shows its own count
-        counts.append([row.values[c.name].count for c in shown if c.name in row.values and not c.share])
+        counts.append([row.values[c.name].count for c in columns if c.name in row.values and not c.share])
     if max((count for row in counts for count in row), default=0) <= 1:
         return table
     last = ["count", *(_counts(row) for row in counts)]
     return [[*line, count] for line, count in zip(table, last)]
 
 
-def _turned(row: Row, shown: Sequence[Column]) -> list[list[str]]:
+def _turned(row: Row, columns: Sequence[Column]) -> list[list[str]]:
     """A line for each number: one long line would be read by nobody."""
-    names = [[_line(c.title) + ARROWS[c.better], cell(c, row.values[c.name]), _line(c.meaning)] for c in shown]
+    names = [[_line(c.title) + ARROWS[c.better], cell(c, row.values[c.name]), _line(c.meaning)] for c in columns]
     return [["", _line(row.name), ""], *names]
 
 
@@ -338,23 +338,23 @@ def _number(value: Any) -> int | float:
     return value
 
 
-def _column(found: dict[str, Any]) -> Column:
-    better, digits = found["better"], found["digits"]
+def _column(data: dict[str, Any]) -> Column:
+    better, digits = data["better"], data["digits"]
     if better not in ARROWS or isinstance(digits, bool) or not isinstance(digits, int) or not 0 <= digits <= 12:
         raise MotionloomError("a column says what does not exist")
-    name, title, meaning = (_text(found[key]) for key in ("name", "title", "meaning"))
-    return Column(name, title, cast(Better, better), meaning, digits, bool(found.get("share", False)))
+    name, title, meaning = (_text(data[key]) for key in ("name", "title", "meaning"))
+    return Column(name, title, cast(Better, better), meaning, digits, bool(data.get("share", False)))
 
 
-def _row(found: dict[str, Any], columns: set[str]) -> Row:
-    values = {_text(k): _value(v) for k, v in found["values"].items()}
+def _row(data: dict[str, Any], columns: set[str]) -> Row:
+    values = {_text(k): _value(v) for k, v in data["values"].items()}
     if not values.keys() <= columns:
         raise MotionloomError("a row has numbers of a column that does not exist")
-    return Row(_text(found["name"]), values, _text(found["measured_on"]))
+    return Row(_text(data["name"]), values, _text(data["measured_on"]))
 
 
-def _value(found: dict[str, Any]) -> Value:
-    mean, interval, count = found["mean"], found["interval"], found["count"]
+def _value(data: dict[str, Any]) -> Value:
+    mean, interval, count = data["mean"], data["interval"], data["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= 1 << 40:
         raise MotionloomError("a number says an impossible count")
     mean = math.nan if mean is None else float(_number(mean))

@@ -28,23 +28,23 @@ def fill(text: str, reports: Sequence[Report], *, again: bool = False) -> tuple[
     A suite without a place gets one at the end; ``again`` lets a quick run replace a full one.
     """
     for report in reports:
-        if not any(found[2] == report.suite for found in PLACE.finditer(text)):
+        if not any(match[2] == report.suite for match in PLACE.finditer(text)):
             text = f"{text.rstrip()}\n\n## {report.title}\n\n<!-- suite {report.suite} -->\n<!-- end -->\n"
     by_suite = {report.suite: report for report in reports}
-    left: list[str] = []
+    skips: list[str] = []
 
-    def one(found: re.Match[str]) -> str:
-        report = by_suite.get(found[2])
+    def one(match: re.Match[str]) -> str:
+        report = by_suite.get(match[2])
         if report is None:
-            return found[0]
+            return match[0]
         quick = bool(report.protocol.get("quick", False))
-        full_before = "|" in found[3] and QUICK_MARK not in found[3]
+        full_before = "|" in match[3] and QUICK_MARK not in match[3]
         if quick and full_before and not again:
-            left.append(report.suite)
-            return found[0]
-        return f"{opening(report, 'suite')}{QUICK_MARK if quick else ''}{shown(report)}{found[4]}"
+            skips.append(report.suite)
+            return match[0]
+        return f"{opening(report, 'suite')}{QUICK_MARK if quick else ''}{as_section(report)}{match[4]}"
 
-    return PLACE.sub(one, text), left
+    return PLACE.sub(one, text), skips
 
 
 def opening(report: Report, kind: Literal["suite", "figures"]) -> str:
@@ -54,25 +54,24 @@ def opening(report: Report, kind: Literal["suite", "figures"]) -> str:
     return f"<!-- {kind}{f' {report.suite}' if kind == 'suite' else ''}{of.replace('-->', '')} -->\n"
 
 
-def shown(report: Report) -> str:
+def as_section(report: Report) -> str:
     """The report as Markdown without its title and with no comment of its own that could end its place."""
-    body = re.sub(r"\A# .*\n+", "", markdown(report))
-    return body.replace("<!--", "< !--")
+    return re.sub(r"\A# .*\n+", "", markdown(report)).replace("<!--", "< !--")
 
 
 def check_page(path: Path) -> str:
-    """The text of a page of results: ask before long work. `MotionloomError` if there is none."""
+    """The text of a page of results: a check before long work. `MotionloomError` if there is none."""
     try:
         return read_bytes(path, max_bytes=LARGEST, empty=True).decode("utf-8")
     except ValueError as error:
-        said = error if isinstance(error, MotionloomError) else f"{path} is no text in UTF-8"
-        raise MotionloomError(f"{said}; name a page with marker comments") from None
+        reason = error if isinstance(error, MotionloomError) else f"{path} is no text in UTF-8"
+        raise MotionloomError(f"{reason}; name a page with marker comments") from None
 
 
 def fill_page(path: Path, reports: Sequence[Report], *, again: bool = False) -> list[str]:
     """Fill the file; the suites left alone (`fill`). `MotionloomError` if there is no such page."""
     text = check_page(path)
-    filled, left = fill(text, reports, again=again)
-    if filled != text:
-        write_text(path, filled)
-    return left
+    page, skips = fill(text, reports, again=again)
+    if page != text:
+        write_text(path, page)
+    return skips

@@ -23,7 +23,7 @@ def columns(table: str) -> tuple[Column, ...]:
 
 
 def notes(table: str, numbers: Mapping[str, Any] | None = None) -> tuple[str, ...]:
-    """The notes under a table, with the numbers that they name put in."""
+    """The notes under a table, with the numbers that they name inserted."""
     return tuple(note.format(**(numbers or {})) for note in _read("motionloom_lab.suites", "notes.toml")[table])
 
 

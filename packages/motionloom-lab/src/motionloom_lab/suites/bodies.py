@@ -1,7 +1,7 @@
-"""Recorded people as `lab.metrics.bodies` wants them, and what drawn bodies are beside them.
+"""Recorded people as `lab.metrics.bodies` reads them, and generated bodies beside them.
 
 ``bodies.json`` beside this file holds the percentiles of the packs that the project was built with (no motion);
-`motionloom evaluate reach` makes it anew.
+`motionloom evaluate reach` writes it anew.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,23 +45,23 @@ def _recordings(folders: Sequence[Path | str], say: Say) -> Iterator[Array]:
             if number % 100 == 0:
                 say(f"{folder}: recording {number + 1} of {len(takes)}")
             try:
-                read = take.read()
+                recording = take.read()
             except MotionloomError:
-                continue  # `data build` says which
-            if not isinstance(read, np.ndarray):
+                continue  # `data build` reports which
+            if not isinstance(recording, np.ndarray):
                 count += 1
-                yield read.own
+                yield recording.own
     if not count:
         raise MotionloomError(
             f"{', '.join(map(str, folders))}: no recordings of joints; name folders of BVH or AMC files"
         )
 
 
-def judge(made: Sequence[Array], reach: bodies.Reach) -> dict[str, Any]:
-    """How drawn bodies are held, as plain data; ``passed`` of ``of``."""
-    rows = bodies.compare_bodies(made, reach)
-    whole = float(np.mean([whole_frames(clip).mean() for clip in made])) if made else 0.0
-    stretched = bodies.stretched(made)
+def judge(clips: Sequence[Array], reach: bodies.Reach) -> dict[str, Any]:
+    """How generated bodies are held, as plain data; ``passed`` of ``of``."""
+    rows = bodies.compare_bodies(clips, reach)
+    whole = float(np.mean([whole_frames(clip).mean() for clip in clips])) if clips else 0.0
+    stretched = bodies.stretched(clips)
     numbers: dict[str, Any] = {
         row.name: {"median": row.median, "people": list(row.reach), "outside": row.outside, "passes": row.passes}
         for row in rows
@@ -71,15 +71,15 @@ def judge(made: Sequence[Array], reach: bodies.Reach) -> dict[str, Any]:
     return {"numbers": numbers, "passed": sum(n["passes"] for n in numbers.values()), "of": len(numbers)}
 
 
-def table(found: dict[str, Any]) -> list[list[str]]:
+def table(answer: dict[str, Any]) -> list[list[str]]:
     """Rows of text for `judge`'s answer, the heading first."""
     rows = [["body", "drawn", "people (5 to 95 %)", "outside", "", "what it is"]]
-    for name, n in found["numbers"].items():
+    for name, n in answer["numbers"].items():
         verdict = "ok" if n["passes"] else "FAIL"
         if name in bodies.MEANING:
             people = f"{n['people'][1]:.0f} to {n['people'][3]:.0f}"
             rows.append([name, f"{n['median']:.1f}", people, f"{n['outside']:.1%}", verdict, bodies.MEANING[name]])
-    whole, bones = found["numbers"]["whole"], found["numbers"]["bones"]
+    whole, bones = answer["numbers"]["whole"], answer["numbers"]["bones"]
     limits = (f">= {1 - bodies.OUTSIDE:.0%}", f"<= {bodies.STRETCHED:.0%}")
     for name, value, limit, n, meaning in (
         ("whole", whole["share"], limits[0], whole, "frames in which the body is a person's (kinematics/wholeness.py)"),

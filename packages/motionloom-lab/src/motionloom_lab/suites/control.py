@@ -1,8 +1,8 @@
-"""The control suite: motions that are asked to follow real ones, in the layout of the paper's Table 4 and beyond it.
+"""The control suite: motions that should follow real ones, in the layout of the paper's Table 4 and beyond it.
 
 Every goal is taken out of a held-out real motion with its caption and length (Shafir et al. 2024, section 5.3). The
-papers' numbers say how real the result looks and not whether the goal was met; here both are measured, in the world.
-Each way of control is a function, so that a made-up one can be tested. Every replication of every row is kept in a
+papers' numbers are of how real the result looks and not of whether the goal was met; here both are, in the world.
+Each way of control is a function, so that an artificial one can be tested. Every replication of every row is kept in a
 small file as it is done; a run that was stopped goes on with the next one.
 """
 
@@ -28,7 +28,7 @@ from motionloom_lab.report.report import REAL, Report
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import control_kinds, text_reference
 from motionloom_lab.suites.control_kinds import Kind, Target
-from motionloom_lab.suites.control_methods import BASE, METHODS, Made, Maker, checked, fits, maker
+from motionloom_lab.suites.control_methods import BASE, METHODS, Maker, Track, checked, fits, maker
 from motionloom_lab.suites.harness import Parts, Run, check_names, digest, diversity, physical_mean, replicated, row_of
 from motionloom_lab.suites.items import Item, fitting, pick, read_items, spread
 from motionloom_lab.suites.protocol import Protocol, Selection
@@ -40,9 +40,9 @@ RATIOS = {
     "slide_ratio": "skate_slide",
     "jerk_ratio": "jerk",
 }
-"""Columns that hold a number against that of the uncontrolled row of the same kind and finish (`BASE`)."""
-SEEN = {"skate_share": 0.1, "skate_speed": 0.1, "skate_slide": 0.01, "jerk": 0.1}
-"""Of uncontrolled motions: what is smaller is nothing, and nothing is held against it."""
+"""Columns that compare a number with that of the uncontrolled row of the same kind and finish (`BASE`)."""
+VISIBLE = {"skate_share": 0.1, "skate_speed": 0.1, "skate_slide": 0.01, "jerk": 0.1}
+"""Of uncontrolled motions: what is smaller is nothing, and nothing is compared with it."""
 
 COLUMNS = columns("control")
 
@@ -65,19 +65,19 @@ class ControlTrial:
     """(263,) standard deviations of the representation's numbers."""
     data: str
     selection: Selection
-    plain: dict[tuple[str, int], tuple[list[Made], float]] = field(default_factory=dict)
+    plain: dict[tuple[str, int], tuple[list[Track], float]] = field(default_factory=dict)
     """What is the same for every kind, the uncontrolled motions of each replication, and the seconds they took."""
 
     def captions(self, replication: int) -> tuple[list[Caption], Array]:
         """One caption per item for a replication, in words and as (items, width)."""
         picked = pick([item.captions for item in self.items], np.random.default_rng((self.protocol.seed, replication)))
-        said = [item.captions[k] for item, k in zip(self.items, picked, strict=True)]
-        return said, np.stack([several[k] for several, k in zip(self.texts, picked, strict=True)])
+        words = [item.captions[k] for item, k in zip(self.items, picked, strict=True)]
+        return words, np.stack([several[k] for several, k in zip(self.texts, picked, strict=True)])
 
     def targets(self, one: Kind, replication: int) -> list[Target]:
-        """What a kind asks of each motion of a replication."""
-        said, _ = self.captions(replication)
-        return [control_kinds.target_of(one, i.features, c.text) for i, c in zip(self.items, said, strict=True)]
+        """The target of each motion of a replication."""
+        captions, _ = self.captions(replication)
+        return [control_kinds.target_of(one, i.features, c.text) for i, c in zip(self.items, captions, strict=True)]
 
 
 def prepare(
@@ -117,14 +117,14 @@ def prepare(
 
 
 def measured(
-    trial: ControlTrial, replication: int, made: Sequence[Made], targets: Sequence[Target]
+    trial: ControlTrial, replication: int, tracks: Sequence[Track], targets: Sequence[Target]
 ) -> dict[str, float]:
     """What one motion per target is worth; a number that has no meaning for this kind is left out."""
-    embedded = trial.evaluator.motions([one.features for one in made])
+    embedded = trial.evaluator.motions([one.features for one in tracks])
     return {
         **_judged(trial, replication, embedded),
-        **met(made, targets, trial.scale),
-        **physical_mean([one.positions for one in made]),
+        **met(tracks, targets, trial.scale),
+        **physical_mean([one.positions for one in tracks]),
     }
 
 
@@ -138,24 +138,24 @@ def _judged(trial: ControlTrial, replication: int, embedded: Array) -> dict[str,
     }
 
 
-def met(made: Sequence[Made], targets: Sequence[Target], scale: np.ndarray) -> dict[str, float]:
-    """How far the motions are from what was asked: cm, shares, degrees, standard deviations."""
-    pairs = list(zip(made, targets, strict=True))
+def met(tracks: Sequence[Track], targets: Sequence[Target], scale: np.ndarray) -> dict[str, float]:
+    """How far the motions are from their targets: cm, shares, degrees, standard deviations."""
+    pairs = list(zip(tracks, targets, strict=True))
     apart = [metrics.distances(one.positions, target.goal.positions, target.goal.mask) for one, target in pairs]
     root, joints, both = metrics.of_root(apart), metrics.of_joints(apart), metrics.control_error(apart)
-    found = {**_error("root", root), **_error("joint", joints)}
+    numbers = {**_error("root", root), **_error("joint", joints)}
     if both is not None:
-        found |= {"worst": both.worst, "beyond_20": both.beyond_20, "beyond_50": both.beyond_50}
+        numbers |= {"worst": both.worst, "beyond_20": both.beyond_20, "beyond_50": both.beyond_50}
     turns = [
         metrics.facing_error(one.positions, target.goal.positions, target.goal.facing_mask) for one, target in pairs
     ]
-    found["facing"] = float(np.mean(every)) if (every := np.concatenate(turns)).size else math.nan
-    found["feature_error"] = metrics.feature_error(
-        [one.features / scale for one in made],
+    numbers["facing"] = float(np.mean(every)) if (every := np.concatenate(turns)).size else math.nan
+    numbers["feature_error"] = metrics.feature_error(
+        [one.features / scale for one in tracks],
         [target.known / scale for target in targets],
         [target.mask for target in targets],
     )
-    return {name: number for name, number in found.items() if math.isfinite(number)}
+    return {name: number for name, number in numbers.items() if math.isfinite(number)}
 
 
 def _error(of: str, error: ControlError | None) -> dict[str, float]:
@@ -171,20 +171,20 @@ def of_real(trial: ControlTrial, replication: int) -> dict[str, float]:
 def of_method(trial: ControlTrial, one: Kind, name: str, replication: int) -> dict[str, float]:
     """One way of control on one kind of goal; the time is that of making the motions."""
     targets = trial.targets(one, replication)
-    made, seconds = trial.plain.get((name, replication)) or _generated(trial, one, name, replication, targets)
+    tracks, seconds = trial.plain.get((name, replication)) or _generated(trial, one, name, replication, targets)
     if name in BASE.values():
-        trial.plain[name, replication] = made, seconds
-    return {**measured(trial, replication, made, targets), "seconds": seconds / len(targets)}
+        trial.plain[name, replication] = tracks, seconds
+    return {**measured(trial, replication, tracks, targets), "seconds": seconds / len(targets)}
 
 
 def _generated(
     trial: ControlTrial, one: Kind, name: str, replication: int, targets: Sequence[Target]
-) -> tuple[list[Made], float]:
+) -> tuple[list[Track], float]:
     """One motion per target, and the seconds that all took."""
     make = trial.make(one, name)
     start = time.perf_counter()
-    made = make(targets, seeds=trial.protocol.seeds(replication, len(targets)))
-    return checked(made, targets), time.perf_counter() - start
+    tracks = make(targets, seeds=trial.protocol.seeds(replication, len(targets)))
+    return checked(tracks, targets), time.perf_counter() - start
 
 
 # ---- the run ---------------------------------------------------------------------------------------------------------
@@ -201,20 +201,20 @@ def measure(
     """All rows: the real motions, then each way of control for each kind of goal.
 
     A way that these weights cannot go (no adapter of that name) is reported in a note and stops nothing. The
-    uncontrolled rows are made wherever something is held against them.
+    uncontrolled rows are measured wherever something is compared with them.
     """
     run, parts, count = run or Run(), parts or Parts(None, ""), range(trial.protocol.replications)
-    wanted = {*methods, *(BASE[name] for name in methods)}
+    chosen = {*methods, *(BASE[name] for name in methods)}
     fixed = ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration", "fid")  # the same motion each time
     rows, missing = [row_of(REAL, [of_real(trial, r) for r in count], COLUMNS, fixed)], list[str]()
     for one in kinds:
-        found: dict[str, list[dict[str, float]]] = {}
-        for name in [name for name in METHODS if name in wanted and fits(one, name)]:
+        table: dict[str, list[dict[str, float]]] = {}
+        for name in [name for name in METHODS if name in chosen and fits(one, name)]:
             row = f"{one.name} {name}"
             for r in count:
                 parts.find(f"{row} {r}")  # those of another run are refused
             try:
-                found[name] = replicated(
+                table[name] = replicated(
                     row,
                     len(count),
                     lambda r, one=one, name=name: of_method(trial, one, name, r),
@@ -226,8 +226,8 @@ def measure(
                 missing.append(f"{one.title}, {name}: not measured ({error})")
                 run.progress(missing[-1])
         rows += [
-            row_of(f"{one.title}, {name}", against(numbers, found.get(BASE[name])), COLUMNS)
-            for name, numbers in found.items()
+            row_of(f"{one.title}, {name}", against(numbers, table.get(BASE[name])), COLUMNS)
+            for name, numbers in table.items()
         ]
     protocol = trial.protocol
     described = protocol.described(
@@ -238,8 +238,8 @@ def measure(
         "goals": [one.name for one in kinds],
         "fid": f"of {len(trial.items)} motions to all {len(trial.everyone)} real ones",
     }
-    said = (*_notes(trial), *missing)
-    return run.report("control", f"Control: {run.label}", described, rows, said, beside="control")
+    under = (*_notes(trial), *missing)
+    return run.report("control", f"Control: {run.label}", described, rows, under, beside="control")
 
 
 def _in_words(numbers: Mapping[str, float]) -> str:
@@ -252,7 +252,7 @@ def against(numbers: Sequence[dict[str, float]], base: Sequence[dict[str, float]
     if base is None:
         return list(numbers)
     return [
-        {**own, **{name: own[of] / plain[of] for name, of in RATIOS.items() if plain[of] > SEEN[of]}}
+        {**own, **{name: own[of] / plain[of] for name, of in RATIOS.items() if plain[of] > VISIBLE[of]}}
         for own, plain in zip(numbers, base, strict=True)
     ]
 
@@ -283,11 +283,11 @@ def run(
         selection: which real motions of the data; None: the usual ones.
         protocol: as of `settings`.
     """
-    protocol, asked = protocol or settings(), control_kinds.kinds(kinds)
+    protocol, goals = protocol or settings(), control_kinds.kinds(kinds)
     check_names(methods, METHODS, "ways of control")
     if run.data is None:
         raise MotionloomError("goals are taken out of real motions, and none are shipped; name a set with --data")
-    prior = run.prior(protocol.steps[0])  # what cannot be drawn is said before anything is read
+    prior = run.prior(protocol.steps[0])  # unusable weights are reported before anything is read
     judge, selection = run.judge(), fitting(run.data, selection)
     trial = prepare(
         read_items(run.data, selection),
@@ -298,9 +298,9 @@ def run(
         selection=selection,
     )
     files = {name: digest(path) for name, path in adapters().items()}
-    said = {**protocol.sampling(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
-    parts = run.parts({**said, **run.settings(judge)})
-    return measure(trial, asked, methods, run, parts=parts)
+    about = {**protocol.sampling(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
+    parts = run.parts({**about, **run.settings(judge)})
+    return measure(trial, goals, methods, run, parts=parts)
 
 
 def settings(
@@ -311,7 +311,7 @@ def settings(
     guidance: float = GUIDANCE,
     seed: int = 0,
 ) -> Protocol:
-    """How it is measured unless asked otherwise; fewer motions than 32 are one batch."""
+    """How it is measured by default; fewer motions than 32 are one batch."""
     return Protocol(
         count=count,
         batch=min(32, max(count, 4)),

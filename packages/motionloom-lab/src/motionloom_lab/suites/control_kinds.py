@@ -1,4 +1,4 @@
-"""What control is asked for in the suite `control`: kinds of goals, each taken out of a real motion.
+"""The goals of the suite `control`: kinds of goals, each taken out of a real motion.
 
 A kind is known by its parts: ``trajectory``, a joint, or several with ``+`` between them, in every frame; ``keyframes``
 and ``in_between`` are sparse. Each is given twice: as a goal in the world, and as the numbers of the representation
@@ -57,19 +57,19 @@ class Kind:
         return self.parts if self.when == "always" else ("any",)
 
     def frames(self, count: int) -> np.ndarray:
-        """(count,) flags of the frames that are asked."""
+        """(count,) flags of the frames with a target."""
         at = np.arange(count)
         if self.when == "each second":
-            return (at % SECOND == 0) & (at > 0)  # frame 0 would say where the body is, which nobody asked
+            return (at % SECOND == 0) & (at > 0)  # frame 0 would fix where the body is, which is no goal
         if self.when == "ends":
-            given = min(SECOND, count // 4)  # of a short motion half is left open
-            return (at < given) | (at >= count - given)
+            edge = min(SECOND, count // 4)  # of a short motion half is left open
+            return (at < edge) | (at >= count - edge)
         return np.ones(count, bool)
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """One motion that is asked for."""
+    """The goal of one motion."""
 
     prompt: str
     goal: Goal
@@ -100,33 +100,33 @@ def kind(name: str) -> Kind:
 
 def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     """The kinds of those names; MotionloomError for an unknown one, one that is there twice, and none at all."""
-    found = tuple(kind(name) for name in names)
-    titles = [one.title for one in found]
-    if not 1 <= len(found) <= MOST_KINDS or len(set(titles)) != len(titles):
+    result = tuple(kind(name) for name in names)
+    titles = [one.title for one in result]
+    if not 1 <= len(result) <= MOST_KINDS or len(set(titles)) != len(titles):
         raise MotionloomError(
             f"name 1 to {MOST_KINDS} different kinds of control; got {', '.join(names)[:200] or 'none'}"
         )
-    return found
+    return result
 
 
 def target_of(one: Kind, features: np.ndarray, prompt: str) -> Target:
-    """What a real motion (frames, 263), not standardised, asks of another with the same words."""
+    """What a real motion (frames, 263), not standardised, as the target of another with the same words."""
     known = np.asarray(features, dtype=np.float64)
     positions = humanml.decode_positions(known)
     at = one.frames(len(known))
-    asked = np.zeros(positions.shape, bool)
+    flags = np.zeros(positions.shape, bool)
     fixed = np.zeros(known.shape, bool)
     for part in one.parts:
         if part == TRAJECTORY:
-            asked[at, 0] |= np.array([True, False, True])  # on the ground
+            flags[at, 0] |= np.array([True, False, True])  # on the ground
             fixed[at] |= mask("root_horizontal")
         elif part == WHOLE:
-            asked[at], fixed[at] = True, np.ones(WIDTH, bool)
+            flags[at], fixed[at] = True, np.ones(WIDTH, bool)
         else:
-            asked[at, SMPL22.names.index(part)] = True
+            flags[at, SMPL22.names.index(part)] = True
             fixed[at] |= mask(part)
     turns = at if {TRAJECTORY, WHOLE} & set(one.parts) else np.zeros(len(at), bool)
-    return Target(prompt, Goal(positions, asked, facing(known), turns, start=GroundPose()), known, fixed)
+    return Target(prompt, Goal(positions, flags, facing(known), turns, start=GroundPose()), known, fixed)
 
 
 def facing(features: np.ndarray) -> Array:

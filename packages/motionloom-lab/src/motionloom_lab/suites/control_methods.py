@@ -35,11 +35,11 @@ BASE = {
     LOOSE: EXPORTED,
     OURS: EXPORTED,
 }
-"""The uncontrolled row that each is a ratio to: of motions as drawn, or of exported ones."""
+"""The uncontrolled row that each is a ratio to: of motions as sampled, or of exported ones."""
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class Track:
     """One motion."""
 
     positions: Array
@@ -49,9 +49,9 @@ class Made:
 
 
 class Method(Interface):
-    """Motion i of the answer meets target i as well as it can, drawn from seed i alone."""
+    """Motion i of the answer meets target i as well as it can, from seed i alone."""
 
-    def __call__(self, targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]: ...
+    def __call__(self, targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Track]: ...
 
 
 Maker = Callable[[Kind, str], Method]
@@ -86,13 +86,13 @@ def maker(prior: Prior, how: Drawing) -> Maker:
 
 
 def uncontrolled(prior: Prior, how: Drawing, *, exported: bool) -> Method:
-    """Goals are ignored: motions from the words alone, as the network draws them or as they are exported."""
+    """Goals are ignored: motions from the words alone, as the network samples them or as they are exported."""
 
-    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
-        drawn = sample_features(
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Track]:
+        motions = sample_features(
             prior, [target.prompt for target in targets], [len(target) for target in targets], seeds=seeds, **how
         )
-        features = [one.astype(np.float64) for one in drawn]
+        features = [one.astype(np.float64) for one in motions]
         return [of_motion(to_motion(one, prior.fps)) if exported else of_features(one) for one in features]
 
     return draw
@@ -101,16 +101,16 @@ def uncontrolled(prior: Prior, how: Drawing, *, exported: bool) -> Method:
 def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise_free: bool) -> Method:
     """Control in the representation: the fixed numbers are written into every estimate (`diffusion_blending`)."""
 
-    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
-        result: dict[int, Made] = {}
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Track]:
+        result: dict[int, Track] = {}
         for rows in groups([len(target) for target in targets]):
             some = [targets[row] for row in rows]
             mask = np.stack([target.mask for target in some])
-            given = np.stack([target.known for target in some]).astype(np.float32)
-            known = Observed((given - prior.mean) / prior.std, mask, noise_free)
+            real = np.stack([target.known for target in some]).astype(np.float32)
+            known = Observed((real - prior.mean) / prior.std, mask, noise_free)
             prompts, own = [target.prompt for target in some], [seeds[row] for row in rows]
-            drawn = prior.to_features(control_features(prior, nets, prompts, known, seeds=own, **how))
-            fixed = np.where(mask, given, drawn).astype(np.float64)
+            features = prior.to_features(control_features(prior, nets, prompts, known, seeds=own, **how))
+            fixed = np.where(mask, real, features).astype(np.float64)
             result |= {row: of_features(one) for row, one in zip(rows, fixed, strict=True)}
         return [result[row] for row in range(len(targets))]
 
@@ -120,30 +120,30 @@ def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise
 def ours(prior: Prior, how: Drawing, *, exact: bool) -> Method:
     """`tasks.control.control` as it is by default, with or without its exact fit; as exported."""
 
-    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Track]:
         from motionloom.tasks.control import control
 
-        made = []
+        tracks = []
         for target, seed in zip(targets, seeds, strict=True):
             (one,) = control(
                 prior, target.prompt, target.goal, seed=seed, guidance=how["guidance"], steps=how["steps"], fit=exact
             )
-            made.append(of_motion(one.motion))
-        return made
+            tracks.append(of_motion(one.motion))
+        return tracks
 
     return draw
 
 
-def of_features(features: np.ndarray) -> Made:
-    """A motion as it is drawn; it starts at the origin facing +Z, as the real one does."""
-    return Made(humanml.decode_positions(features), features)
+def of_features(features: np.ndarray) -> Track:
+    """A motion as it is sampled; it starts at the origin facing +Z, as the real one does."""
+    return Track(humanml.decode_positions(features), features)
 
 
-def of_motion(motion: Motion) -> Made:
+def of_motion(motion: Motion) -> Track:
     """A motion as it is exported, on 22 joints at 20 frames per second; the last frame's numbers are there twice."""
     positions = motion.positions()
     features = humanml.positions_to_features(positions, motion.fps).astype(np.float64)
-    return Made(positions, np.concatenate([features, features[-1:]]))  # a frame has a step only to the next one
+    return Track(positions, np.concatenate([features, features[-1:]]))  # a frame has a step only to the next one
 
 
 def groups(lengths: Sequence[int]) -> list[list[int]]:
@@ -154,11 +154,11 @@ def groups(lengths: Sequence[int]) -> list[list[int]]:
     return [rows[at : at + ROWS] for rows in by_length.values() for at in range(0, len(rows), ROWS)]
 
 
-def checked(made: Sequence[Made], targets: Sequence[Target]) -> list[Made]:
-    """The motions, if they have the lengths asked for; ValueError otherwise, since a number would be a lie."""
-    for one, target in zip(made, targets, strict=True):
+def checked(tracks: Sequence[Track], targets: Sequence[Target]) -> list[Track]:
+    """The motions, if they have the lengths of the targets; ValueError otherwise, since a number would be a lie."""
+    for one, target in zip(tracks, targets, strict=True):
         if one.positions.shape != target.goal.positions.shape or len(one.features) != len(target):
             raise ValueError(f"a motion of {one.positions.shape} for a goal of {target.goal.positions.shape}")
         if not np.isfinite(one.positions).all():
             raise ValueError("a motion has numbers that are not finite")
-    return list(made)
+    return list(tracks)

@@ -1,7 +1,7 @@
 """Prefix completion of two people: the table of Shafir et al. 2024 (priorMDM, table 3) on held-out pairs of one's own.
 
-One second of both is given and three are said. Besides the paper's errors every row has what an error cannot see: how
-much the completions move, touch and lie in each other, beside the real ones.
+One second of both is given and three are predicted. Besides the paper's errors every row has what an error cannot see:
+how much the completions move, touch and lie in each other, beside the real ones.
 """
 
 import hashlib
@@ -49,19 +49,19 @@ def beside_rows(prior: Prior, files: Sequence[str | Path], how: CompletionSettin
 
     Raises MotionloomError for a file that is none, for another prior's block, and for two blocks of one name.
     """
-    found: dict[str, Beside] = {}
+    rows: dict[str, Beside] = {}
     for file in files:
         block = PairBlock.load(file, prior)
         name = " ".join(block.name.split())[:LONGEST]
-        if name in found:
+        if name in rows:
             raise MotionloomError(f"two of the blocks to stand beside are called {name!r}; give each a name of its own")
         path = blocks().get(str(file)) or Path(file)
-        found[name] = Beside(f"{name}: {sizes(block)}", digest(path)[:12], ways.sampled(prior, block.net(prior), how))
-    return tuple(found.values())
+        rows[name] = Beside(f"{name}: {sizes(block)}", digest(path)[:12], ways.sampled(prior, block.net(prior), how))
+    return tuple(rows.values())
 
 
 def sizes(block: PairBlock) -> str:
-    """What tells blocks of one prior apart: 2 layers after layer 6."""
+    """What distinguishes blocks of one prior: 2 layers after layer 6."""
     config = block.config
     unaware = "" if config.aware else ", not aware"
     return f"{config.layers} {'layer' if config.layers == 1 else 'layers'} after layer {config.split}{unaware}"
@@ -113,22 +113,22 @@ def run(
     how = how or CompletionSettings()
     check_names(kinds, KINDS, "rows")
     prior = Prior.load(run.weights, device=run.device)
-    found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
-    made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=run.device)
+    own = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
+    every = ways_of(prior, own, how, kinds, communication=communication, mrt=mrt, device=run.device)
     others = beside_rows(prior, beside, how)
     crops = draw(held_out(pairs_of(run.data, captions=False, say=run.progress)), how)
     about = {
         "weights": run.label,
-        "block": found.name if found else None,
+        "block": own.name if own else None,
         "device": run.device,
         "files": {str(k): _digest(v) for k, v in (("communication", communication), ("mrt", mrt)) if v},
-        "block file": _digest_of(found) if found else None,
+        "block file": _digest_of(own) if own else None,
     }
-    return measure(crops, made, how, run=run, kinds=kinds, beside=others, with_published=with_published, about=about)
+    return measure(crops, every, how, run=run, kinds=kinds, beside=others, with_published=with_published, about=about)
 
 
 def chosen_block(block: str | Path | None) -> str | Path:
-    """The one that was asked for, or the shipped one; raises MotionloomError where there is none."""
+    """The named one, or the shipped one; raises MotionloomError where there is none."""
     if block is not None:
         return block
     if not blocks():
@@ -138,23 +138,19 @@ def chosen_block(block: str | Path | None) -> str | Path:
 
 def held_out(pairs: Sequence[Pair]) -> list[Pair]:
     """Those of validation and test that are long enough for a crop; raises NoData where there is none."""
-    found = [pair for pair in pairs if pair.split in HELD_OUT and pair.frames > FRAMES]
-    if not found:
+    chosen = [pair for pair in pairs if pair.split in HELD_OUT and pair.frames > FRAMES]
+    if not chosen:
         raise NoData(
             f"there is no held-out pair of {FRAMES + 1} frames or more; ten pairs or more give one for validation"
         )
-    return found
+    return chosen
 
 
 def draw(pairs: Sequence[Pair], how: CompletionSettings) -> Crops:
     """Random crops, every pair as often as any, either person first."""
-    rng = np.random.default_rng(how.seed)
-    made = []
-    for _ in range(how.crops):
-        positions = pairs[int(rng.integers(len(pairs)))].positions
-        start = int(rng.integers(positions.shape[1] - FRAMES))
-        made.append(positions[:: 1 if rng.random() < 0.5 else -1, start : start + FRAMES + 1])
-    return Crops(np.stack(made), tuple(range(how.crops)))
+    rng, motions = np.random.default_rng(how.seed), [pair.positions for pair in pairs]
+    crops = [ways.random_crop(motions, FRAMES + 1, rng) for _ in range(how.crops)]
+    return Crops(np.stack(crops), tuple(range(how.crops)))
 
 
 def ways_of(
@@ -168,20 +164,20 @@ def ways_of(
     device: str = "cpu",
 ) -> dict[str, Way]:
     """Every way that there are weights for, by its kind."""
-    found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
-    found["silent"] = ways.sampled(prior, ways.no_communication_net(prior), how)
+    result: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
+    result["silent"] = ways.sampled(prior, ways.no_communication_net(prior), how)
     if communication is not None and "communication" in kinds:
-        found["communication"] = ways.sampled(*ways.only_communication(prior, communication), how)
+        result["communication"] = ways.sampled(*ways.only_communication(prior, communication), how)
     if block is not None:
-        found["ours"] = ways.sampled(prior, block.net(prior), how)
+        result["ours"] = ways.sampled(prior, block.net(prior), how)
     if mrt is not None and "mrt" in kinds:
-        found["mrt"] = ways.by_mrt(MrtFile.load(mrt, device=device).net)
-    return found
+        result["mrt"] = ways.by_mrt(MrtFile.load(mrt, device=device).net)
+    return result
 
 
 def measure(
     crops: Crops,
-    found: Mapping[str, Way],
+    every: Mapping[str, Way],
     how: CompletionSettings,
     *,
     run: Run | None = None,
@@ -192,18 +188,18 @@ def measure(
 ) -> Report:
     """The report of ways on crops. Pieces of blocks ``beside`` go by their own files: one more changes no other."""
     run = run or Run()
-    said = protocol_of(crops, how) | dict(about or {})
-    settings = {**said, **asdict(how)}
+    terms = protocol_of(crops, how) | dict(about or {})
+    settings = {**terms, **asdict(how)}
     parts = run.parts(settings)
     names = {"zero": ZERO, "constant": CONSTANT, "silent": SILENT, "communication": ALONE, "ours": "ours", "mrt": MRT}
     rows, errors = [], {}
     if "real" in kinds:
         rows.append(_row(REAL, {name: looks(crops.positions[:, :, :FRAMES])[name] for name in LOOKS}))
-    for kind in [kind for kind in KINDS if kind in kinds and kind in found]:
-        drawn = kind in ("silent", "communication", "ours")
-        samples = how.samples if drawn else 1
-        numbers = _measured(crops, found[kind], samples, parts, name=names[kind], progress=run.progress)
-        one = f"{names[kind]}, one sample" if drawn else names[kind]
+    for kind in [kind for kind in KINDS if kind in kinds and kind in every]:
+        is_sampled = kind in ("silent", "communication", "ours")
+        samples = how.samples if is_sampled else 1
+        numbers = _measured(crops, every[kind], samples, parts, name=names[kind], progress=run.progress)
+        one = f"{names[kind]}, one sample" if is_sampled else names[kind]
         errors[kind] = (names[kind], numbers)
         rows.append(_row(one, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
         if samples > 1:
@@ -214,10 +210,10 @@ def measure(
         numbers = _measured(crops, one.way, 1, own, name=f"beside {one.digest} {one.row}", progress=run.progress)
         errors[one.row] = (one.row, numbers)
         rows.append(_row(one.row, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
-    said |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
+    terms |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
     under = (*verdicts(errors), *notes("duet-completion"))
     others = "duet-completion" if with_published else ""
-    return run.report("duet-completion", "Two people: three seconds after one", said, rows, under, beside=others)
+    return run.report("duet-completion", "Two people: three seconds after one", terms, rows, under, beside=others)
 
 
 def _row(name: str, numbers: Mapping[str, Array]) -> Row:
@@ -246,29 +242,29 @@ def score(crops: Crops, way: Way, samples: int) -> dict[str, Array]:
     """(crops,) each: errors of a sample and looks, averaged over samples; ``mean_``: those of the samples' mean."""
     real = crops.positions[:, :, :FRAMES]
     began = time.perf_counter()
-    made = np.stack([way(crops, sample) for sample in range(samples)])
+    completions = np.stack([way(crops, sample) for sample in range(samples)])
     spent = (time.perf_counter() - began) / samples / len(real)
-    each = [{**errors_of(real, one), **looks(one)} for one in made]
+    each = [{**errors_of(real, one), **looks(one)} for one in completions]
     numbers = {name: np.mean([one[name] for one in each], axis=0) for name in each[0]}
     if samples > 1:
-        mean = made.mean(axis=0)
+        mean = completions.mean(axis=0)
         numbers |= {f"mean_{name}": value for name, value in {**errors_of(real, mean), **looks(mean)}.items()}
     return numbers | {"seconds": np.full(len(real), spent)}
 
 
-def errors_of(real: Array, made: Array) -> dict[str, Array]:
+def errors_of(real: Array, motions: Array) -> dict[str, Array]:
     """(crops,) metres: the columns `ERRORS`."""
-    found = [mp.completion_errors(r, m) for r, m in zip(real, made, strict=True)]
+    errors = [mp.completion_errors(r, m) for r, m in zip(real, motions, strict=True)]
     return {
-        f"{what}_{k}": np.array([getattr(one[n], what) for one in found])
+        f"{what}_{k}": np.array([getattr(one[n], what) for one in errors])
         for what in ("root", "joint")
         for n, k in enumerate(mp.HORIZONS)
     }
 
 
-def looks(made: Array) -> dict[str, Array]:
+def looks(motions: Array) -> dict[str, Array]:
     """(crops,) each: the columns `LOOKS` of the frames after the prefix."""
-    after = made[:, :, mp.PREFIX - 1 :]
+    after = motions[:, :, mp.PREFIX - 1 :]
     ahead = after[:, :, 1:]
     speed = np.linalg.norm(np.diff(after, axis=2), axis=-1).mean(axis=(1, 2, 3)) * mp.FPS
     feet = [np.mean([foot_skate(person, mp.FPS).contact_speed for person in one]) for one in ahead]
@@ -289,9 +285,9 @@ def verdicts(errors: Mapping[str, tuple[str, Mapping[str, Array]]]) -> tuple[str
         if kind == "ours":
             continue
         apart = [Value.of((errors["ours"][1][f"root_{k}"] - numbers[f"root_{k}"]).tolist()) for k in mp.HORIZONS]
-        said = ", ".join(f"{value.text()} m at {k} s" for k, value in zip(mp.HORIZONS, apart, strict=True))
+        gaps = ", ".join(f"{value.text()} m at {k} s" for k, value in zip(mp.HORIZONS, apart, strict=True))
         notes.append(
-            f"Root error of ours, one sample, less that of {name}, crop by crop (below 0: ours is better): {said}."
+            f"Root error of ours, one sample, less that of {name}, crop by crop (below 0: ours is better): {gaps}."
         )
     return tuple(notes)
 
@@ -319,7 +315,7 @@ def _digest(path: Path) -> str:
 
 
 def _digest_of(block: PairBlock) -> str:
-    made = hashlib.sha256()
+    sha = hashlib.sha256()
     for key in sorted(block.tensors):
-        made.update(key.encode() + np.ascontiguousarray(block.tensors[key]).tobytes())
-    return made.hexdigest()[:12]
+        sha.update(key.encode() + np.ascontiguousarray(block.tensors[key]).tobytes())
+    return sha.hexdigest()[:12]

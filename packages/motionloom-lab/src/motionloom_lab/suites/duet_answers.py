@@ -1,4 +1,4 @@
-"""Answers to somebody: one of a held-out pair is given, and a partner is drawn; judged as duets from words are."""
+"""Answers to somebody: one of a held-out pair is given, and a partner is generated; judged as duets from words are."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import duet_text as judged
 from motionloom_lab.suites.duet import HELD_OUT
 from motionloom_lab.suites.duet_text import NOTES, DuetSettings, Make, Parts, Table
+from motionloom_lab.suites.duet_ways import random_crop
 from motionloom_lab.suites.items import NoData
 from motionloom_train.data.pairs import Pair
 
@@ -40,12 +41,12 @@ class Windows:
     def of(pairs: Sequence[Pair], how: DuetSettings) -> "Windows":
         """Raises NoData where no held-out pair with a caption is long enough."""
         frames = frames_in(how.seconds, mp.FPS)
-        found = tuple(p for p in pairs if p.split in HELD_OUT and p.frames >= frames and p.captions)
-        if not found:
+        chosen = tuple(p for p in pairs if p.split in HELD_OUT and p.frames >= frames and p.captions)
+        if not chosen:
             raise NoData(
                 f"there is no held-out pair of {frames} frames with a caption to answer; ten pairs or more give one"
             )
-        return Windows(found, frames)
+        return Windows(chosen, frames)
 
     def captions(self) -> tuple[str, ...]:
         """What people do in them, each once."""
@@ -54,12 +55,7 @@ class Windows:
     def draw(self, caption: str, count: int, seed: int) -> list[Array]:
         """``count`` windows (2, frames, 22, 3) metres of pairs with that caption; the first person is given."""
         rng, some = np.random.default_rng(seed), [pair.positions for pair in self.pairs if caption in pair.captions]
-        made = []
-        for _ in range(count):
-            positions = some[int(rng.integers(len(some)))]
-            start = int(rng.integers(positions.shape[1] - self.frames + 1))
-            made.append(positions[:: 1 if rng.random() < 0.5 else -1, start : start + self.frames])
-        return made
+        return [random_crop(some, self.frames, rng) for _ in range(count)]
 
     def all(self, how: DuetSettings) -> list[Array]:
         """Those of a whole run, in its order."""
@@ -69,20 +65,20 @@ class Windows:
 
 def parts(prior: Prior, block: PairBlock, pairs: Sequence[Pair], how: DuetSettings) -> Parts:
     """Answers to people of the held-out pairs."""
-    given = Windows.of(pairs, how)
+    pool = Windows.of(pairs, how)
     about = {"given": "one of the two in random windows of validation and test pairs"}
-    return table(given, how), answers(prior, block, given, how), alone(prior, given, how), about
+    return table(pool, how), answers(prior, block, pool, how), alone(prior, pool, how), about
 
 
-def table(given: Windows, how: DuetSettings) -> Table:
+def table(pool: Windows, how: DuetSettings) -> Table:
     """The columns of duets from words, and how far partners are from the real ones."""
     return Table(
         "duet-answers",
         "Two people: answers to somebody",
-        given.captions(),
+        pool.captions(),
         (*NOTES, *notes("duet-answers")),
         columns=COLUMNS,
-        more=lambda duets: apart(duets, given.all(how)),
+        more=lambda duets: apart(duets, pool.all(how)),
     )
 
 
@@ -93,13 +89,13 @@ def apart(duets: Sequence[Array], real: Sequence[Array]) -> Mapping[str, Value]:
     return {f"root_{k}": Value.of([float(one[frame]) for one in way]) for k, frame in at.items() if frame < len(way[0])}
 
 
-def answers(prior: Prior, block: PairBlock, given: Windows, how: DuetSettings) -> Make:
+def answers(prior: Prior, block: PairBlock, pool: Windows, how: DuetSettings) -> Make:
     """`react` to the first person of each window."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        made = []
-        for number, window in enumerate(given.draw(caption, count, seed)):
-            made += react(
+        duets = []
+        for number, window in enumerate(pool.draw(caption, count, seed)):
+            duets += react(
                 prior,
                 block,
                 motion_from_positions(window[0], mp.FPS),
@@ -107,25 +103,25 @@ def answers(prior: Prior, block: PairBlock, given: Windows, how: DuetSettings) -
                 seed=own_seed(seed, number),
                 **how.drawing,
             )
-        return made
+        return duets
 
     return make
 
 
-def alone(prior: Prior, given: Windows, how: DuetSettings) -> Make:
+def alone(prior: Prior, pool: Windows, how: DuetSettings) -> Make:
     """Partners from the prior alone, who begin where the real partner does, facing as they do."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        made = []
-        for number, window in enumerate(given.draw(caption, count, seed)):
+        duets = []
+        for number, window in enumerate(pool.draw(caption, count, seed)):
             (partner,) = generate(prior, caption, seconds=how.seconds, seed=own_seed(seed, number), **how.drawing)
             begins = GroundPose.of_numbers(two.encode(window).poses[1])
-            made.append((motion_from_positions(window[0], mp.FPS), partner.placed(begins)))
-        return made
+            duets.append((motion_from_positions(window[0], mp.FPS), partner.placed(begins)))
+        return duets
 
     return make
 
 
 def own_seed(seed: int, number: int) -> int:
-    """A seed that may be asked for, unlike that of another caption or duet."""
+    """A usable seed, unlike that of another caption or duet."""
     return row_seed(seed, number) % (LARGEST_SEED // 2)

@@ -30,7 +30,7 @@ MOST = 100
 
 @dataclass(frozen=True)
 class LongDuetSettings(judged.DuetSettings):
-    """How long duets are made and measured; ``seconds`` is the length of a segment."""
+    """How long duets are generated and measured; ``seconds`` is the length of a segment."""
 
     segments: int = 3
 
@@ -44,9 +44,9 @@ FULL, QUICK = LongDuetSettings(), LongDuetSettings(duets=2, steps=6, segments=2)
 
 def parts(prior: Prior, block: PairBlock, pairs: Sequence[Pair], how: LongDuetSettings) -> Parts:
     """Long duets for the captions of the train pairs."""
-    said = judged.captions_of(pairs)
+    captions = judged.captions_of(pairs)
     about = {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"}
-    return table(said, how), ours(prior, block, said, how), alone(prior, pairs, said, how), about
+    return table(captions, how), ours(prior, block, captions, how), alone(prior, pairs, captions, how), about
 
 
 def table(captions: tuple[str, ...], how: LongDuetSettings) -> Table:
@@ -60,36 +60,36 @@ def table(captions: tuple[str, ...], how: LongDuetSettings) -> Table:
 
 
 def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: LongDuetSettings) -> Make:
-    """`compose_pair` of captions in turn, from the one that is asked for."""
+    """`compose_pair` of captions in turn, from the requested one."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        made = []
+        duets = []
         for number in range(count):
             pieces = list(
                 compose_pair(prior, block, timeline(captions, caption, how), seed=own_seed(seed, number), **how.drawing)
             )
-            made.append((concatenate(*(a for a, _ in pieces)), concatenate(*(b for _, b in pieces))))
-        return made
+            duets.append((concatenate(*(a for a, _ in pieces)), concatenate(*(b for _, b in pieces))))
+        return duets
 
     return make
 
 
 def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: LongDuetSettings) -> Make:
-    """Two long motions of the prior alone, which begin where partners of random train windows stand."""
+    """Two long motions of the prior alone, which begin where partners of random train windows are."""
     begun = judged.beginnings(pairs, how)
 
     def one(caption: str, seed: int) -> Motion:
         return concatenate(*compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing))
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        made = []
+        duets = []
         for number, poses in enumerate(begun(count, seed)):
             first, second = (
                 one(caption, own_seed(seed, 2 * number + i)).placed(GroundPose.of_numbers(pose))
                 for i, pose in enumerate(poses)
             )
-            made.append((first, second))
-        return made
+            duets.append((first, second))
+        return duets
 
     return make
 

@@ -1,7 +1,7 @@
 """Duets from words beside real pairs: where the two are to each other, what they touch, whether they move together.
 
-Each quantity that separates partners from shuffled people is held against how much real recordings differ from one
-another (`lab.metrics.pair_groups`); strangers, real and made, are rows of their own, and so is the prior without
+Each quantity that separates partners from shuffled people is compared with how much real recordings differ from one
+another (`lab.metrics.pair_groups`); strangers, real and generated, are rows of their own, and so is the prior without
 communication whose people at least begin where real partners do.
 """
 
@@ -55,7 +55,7 @@ COLUMNS = columns("duet-text")
 
 
 class DuetDrawing(TypedDict):
-    """How people are drawn, as the tasks take it."""
+    """How people are sampled, as the tasks take it."""
 
     guidance: float
     steps: int
@@ -64,7 +64,7 @@ class DuetDrawing(TypedDict):
 
 @dataclass(frozen=True)
 class DuetSettings:
-    """How duets are made and measured."""
+    """How duets are generated and measured."""
 
     duets: int = 24
     seconds: float = 6.0
@@ -79,7 +79,7 @@ class DuetSettings:
 
     @property
     def drawing(self) -> "DuetDrawing":
-        """What every task that draws people is asked beside its seed."""
+        """The options of every task that samples people, beside the seed."""
         return {"guidance": self.guidance, "steps": self.steps, "foot_lock": self.clean}
 
 
@@ -98,18 +98,18 @@ class Table:
     suite: str
     title: str
     captions: tuple[str, ...]
-    """What duets are made for, in turn."""
+    """What duets are generated for, in turn."""
     notes: tuple[str, ...] = NOTES
     cuts: tuple[tuple[str, Cut], ...] = (("", lambda duet: duet),)
     """Stretches that are rows, and what the rows' names end in; strangers are of the first, and so is the prior without
     communication."""
     columns: tuple[Column, ...] = COLUMNS
     more: Callable[[Sequence[Array]], Mapping[str, Value]] = lambda duets: {}
-    """Further columns of all that was made, in the order of `turns`."""
+    """Further columns of all duets, in the order of `turns`."""
 
 
 Parts = tuple[Table, Make, Make, dict[str, Any]]
-"""A suite of duets: its table, duets of the block, duets of the prior alone, and what its protocol also says."""
+"""A suite of duets: its table, duets of the block, duets of the prior alone, and further entries of its protocol."""
 
 
 def run(
@@ -126,7 +126,7 @@ def run(
         run: the prior and the data.
         parts_of: the suite: `parts` of this module, of `duet_answers` or of `duet_long`.
         block: a shipped name or a file; None: the shipped one.
-        how: how duets are made and measured.
+        how: how duets are generated and measured.
         kinds: the rows, out of `KINDS`.
     """
     check_names(kinds, KINDS, "rows")
@@ -152,7 +152,7 @@ def text_table(pairs: Sequence[Pair]) -> Table:
 
 
 def beside(prior: Prior, pairs: Sequence[Pair], how: DuetSettings) -> Make:
-    """The prior without communication, its people beginning where partners of random train windows stand."""
+    """The prior without communication, its people beginning where partners of random train windows are."""
     frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
@@ -199,7 +199,7 @@ def measure(
     kinds: Sequence[str] = KINDS,
     about: dict[str, Any] | None = None,
 ) -> Report:
-    """The report of duets made for captions, beside all pairs there are."""
+    """The report of duets generated for captions, beside all pairs there are."""
     run = run or Run()
     recorded = _recorded(pairs, frames_in(how.seconds, mp.FPS))
     real = list(recorded.values())
@@ -207,26 +207,26 @@ def measure(
     for kind, make, name in (("ours", ours, "ours"), ("silent", silent, "prior without communication")):
         if make is None or not {kind, "our-strangers" if kind == "ours" else kind} & set(kinds):
             continue
-        made, seconds = _generated(make, table.captions, how, lambda line, n=name: run.progress(f"{n}: {line}"))
+        duets, seconds = _generated(make, table.captions, how, lambda line, n=name: run.progress(f"{n}: {line}"))
         for end, cut in table.cuts if kind == "ours" else table.cuts[:1]:
-            clips = [cut(duet) for duet in made]
+            clips = [cut(duet) for duet in duets]
             if kind in kinds:
                 rows.append(_row(f"{name}{end}", clips, real, seconds=seconds, more=table.more(clips)))
             if kind == "ours" and "our-strangers" in kinds and end == table.cuts[0][0]:
                 strangers = groups.shuffled(clips)
                 rows.append(_row(f"{name}{end}, partners shuffled", strangers, real, more=table.more(strangers)))
-    said = protocol_of(recorded, table.captions, how) | (about or {})
+    terms = protocol_of(recorded, table.captions, how) | (about or {})
     under = (*verdicts(rows), *table.notes)
-    return run.report(table.suite, table.title, said, rows, under, columns=table.columns)
+    return run.report(table.suite, table.title, terms, rows, under, columns=table.columns)
 
 
 def _recorded(pairs: Sequence[Pair], frames: int) -> dict[str, list[Array]]:
     """Half-overlapping windows of every recording that is long enough."""
-    found = {pair.name: [w.positions for w in windows(pair, frames, frames // 2)] for pair in pairs}
-    found = {name: clips for name, clips in found.items() if clips}
-    if len(found) < 2:
+    by_name = {pair.name: [w.positions for w in windows(pair, frames, frames // 2)] for pair in pairs}
+    by_name = {name: clips for name, clips in by_name.items() if clips}
+    if len(by_name) < 2:
         raise MotionloomError(f"fewer than two pairs have the {frames} frames of a duet; nothing can be compared")
-    return found
+    return by_name
 
 
 def _real_rows(recorded: dict[str, list[Array]], held_out: set[str], kinds: Sequence[str]) -> list[Row]:
@@ -246,11 +246,11 @@ def _real_rows(recorded: dict[str, list[Array]], held_out: set[str], kinds: Sequ
 
 
 def captions_of(pairs: Sequence[Pair]) -> tuple[str, ...]:
-    """What the train pairs are said to do, each once."""
-    found = tuple(dict.fromkeys(text for pair in pairs if pair.split == "train" for text in pair.captions))
-    if not found:
+    """The captions of the train pairs, each once."""
+    captions = tuple(dict.fromkeys(text for pair in pairs if pair.split == "train" for text in pair.captions))
+    if not captions:
         raise MotionloomError("the train pairs have no captions; duets are made for them, so add captions.txt")
-    return found
+    return captions
 
 
 def turns(captions: Sequence[str], how: DuetSettings) -> list[tuple[str, int, int]]:
@@ -265,11 +265,11 @@ def turns(captions: Sequence[str], how: DuetSettings) -> list[tuple[str, int, in
 
 def _generated(make: Make, captions: Sequence[str], how: DuetSettings, say: Say) -> tuple[list[Array], float]:
     """Positions of all duets, in the order of `turns`, and seconds for one."""
-    made, began = [], time.perf_counter()
+    duets, began = [], time.perf_counter()
     for caption, count, seed in turns(captions, how):
         say(f"{count} duets of {caption!r}")
-        made += [np.stack([person.positions() for person in duet]) for duet in make(caption, count, seed)]
-    return made, (time.perf_counter() - began) / how.duets
+        duets += [np.stack([person.positions() for person in duet]) for duet in make(caption, count, seed)]
+    return duets, (time.perf_counter() - began) / how.duets
 
 
 def _row(
@@ -287,9 +287,9 @@ def _row(
     if len(some) > 1:
         values["over_strangers"] = Value(groups.synchrony_against_shuffled(some).size)
     if real is not None:
-        found = groups.compare(clips, real, names=groups.JUDGED)
-        values |= {f"ratio_{one}": Value(found[one].ratio) for one in groups.JUDGED}
-        inside = sum(found[one].within() for one in groups.JUDGED)
+        gaps = groups.compare(clips, real, names=groups.JUDGED)
+        values |= {f"ratio_{one}": Value(gaps[one].ratio) for one in groups.JUDGED}
+        inside = sum(gaps[one].within() for one in groups.JUDGED)
         values["within"] = Value(inside / len(groups.JUDGED), count=len(groups.JUDGED))
     if seconds is not None:
         values["seconds"] = Value(seconds)
@@ -303,9 +303,9 @@ def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
         if not row.name.startswith("ours"):
             continue
         ratios = [(name, row.values[f"ratio_{name}"].mean) for name in groups.JUDGED]
-        said = ", ".join(f"{name.replace('_', ' ')} {ratio:.2f}" for name, ratio in ratios)
+        words = ", ".join(f"{name.replace('_', ' ')} {ratio:.2f}" for name, ratio in ratios)
         inside = "within" if all(ratio <= groups.LIMIT for _, ratio in ratios) else "not within"
-        notes.append(f"{row.name}: {inside} {groups.LIMIT:g} times of the real pairs' spread ({said}).")
+        notes.append(f"{row.name}: {inside} {groups.LIMIT:g} times of the real pairs' spread ({words}).")
         depth = row.values["penetration"].mean
         if "shuffled" not in row.name:
             notes.append(

@@ -1,4 +1,4 @@
-"""Ways of completing what two people did, for `lab.suites.duet`: each sees the first second of crops and says the rest.
+"""Ways of completing what two people did, for `lab.suites.duet`: from the first second of crops to the rest.
 
 ``way(crops, sample)``: `Crops` to (crops, 2, 80, 22, 3) metres in their world, the given frames first.
 """
@@ -45,6 +45,13 @@ class Crops:
     def part(self, some: slice) -> "Crops":
         """Some of them."""
         return Crops(self.positions[some], self.numbers[some])
+
+
+def random_crop(motions: Sequence[Array], frames: int, rng: np.random.Generator) -> Array:
+    """So many frames of one of several (2, frames, 22, 3), either person first."""
+    positions = motions[int(rng.integers(len(motions)))]
+    start = int(rng.integers(positions.shape[1] - frames + 1))
+    return positions[:: 1 if rng.random() < 0.5 else -1, start : start + frames]
 
 
 Way = Callable[[Crops, int], Array]
@@ -111,9 +118,9 @@ def by_mrt(net: Mrt) -> Way:
     return way
 
 
-def visible_part(crop: np.ndarray, given: str) -> np.ndarray:
-    """What of a crop (2, 81, 22, 3) features are made of: (2, known frames + 1, 22, 3)."""
-    frames, true = GIVEN[given]
+def visible_part(crop: np.ndarray, kind: str) -> np.ndarray:
+    """The part of a crop (2, 81, 22, 3) that features are computed from: (2, known frames + 1, 22, 3)."""
+    frames, true = GIVEN[kind]
     if true:
         return crop[:, : frames + 1]
     past = crop[:, :frames]
@@ -154,7 +161,7 @@ def sampled(prior: Prior, net: PairSession, how: CompletionSettings, make: Featu
 
 
 def no_communication_net(prior: Prior) -> PairSession:
-    """The prior without communication: a block that says nothing, and two motions that know nothing of each other."""
+    """The prior without communication: a block that changes nothing, and two independent motions."""
     silent = Talk(fitting(prior.net.config), prior.net.config)
     graph = pair_graph(silent.config, prior.net.config)
     return PairSession(silent.config, arrays(silent), graph, prior.net, prior.schedule, prior.mean, prior.std)
@@ -164,7 +171,7 @@ def bare(prior: Prior) -> Prior:
     """The prior with layers that do nothing: what stays is how motion, level and words come in and motion goes out.
 
     A block trained over it (`motionloom train duet`) is "communication only": the paper's table 3 has such a row and
-    no text says what it was; here it is the communication block in place of the prior's layers.
+    no text describes it; here it is the communication block in place of the prior's layers.
     """
     net = prior_module(prior)
     with torch.no_grad():
@@ -178,8 +185,8 @@ def bare(prior: Prior) -> Prior:
 def _outs(block: nn.Module) -> Sequence[nn.Linear]:
     """What each part of a layer adds to the sum comes out of."""
     assert isinstance(block, (ModulatedBlock, PublishedBlock))
-    heard = [block.heard] if isinstance(block, ModulatedBlock) else []
-    return [block.attention.out, block.linear2, *heard]
+    outs = [block.heard] if isinstance(block, ModulatedBlock) else []
+    return [block.attention.out, block.linear2, *outs]
 
 
 def write_bare(prior: Prior, path: Path | str) -> Path:
@@ -190,5 +197,5 @@ def write_bare(prior: Prior, path: Path | str) -> Path:
 def only_communication(prior: Prior, block: PairBlock | Path | str) -> tuple[Prior, PairSession]:
     """The bare prior and the network of a block that was trained over it; raises MotionloomError for another block."""
     silent = bare(prior)
-    found = block if isinstance(block, PairBlock) else PairBlock.load(block, silent)
-    return silent, found.net(silent)
+    own = block if isinstance(block, PairBlock) else PairBlock.load(block, silent)
+    return silent, own.net(silent)

@@ -80,60 +80,62 @@ def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
     settings = suite.settings(job.quick)
     try:
         mark = fingerprint(suite, job)
-        if not again and (found := _finished(folder, mark)):
-            return Outcome(suite, found, "kept", "it was finished before with the same settings")
+        if not again and (report := _finished(folder, mark)):
+            return Outcome(suite, report, "kept", "it was finished before with the same settings")
         if job.data is not None:
             suite.needs(job.data)
         parts = folder / f"parts-{mark[:12]}"  # other settings never meet in one folder
         if again and parts.is_dir():
             shutil.rmtree(parts)
         job.tools.progress(f"{suite.name}: {suite.measures}")
-        made = suite.run(replace(job, folder=parts), settings)
+        report = suite.run(replace(job, folder=parts), settings)
+        extra: dict[str, Any] = {}
         if suite.judged:
-            judge = evaluator_file(job.evaluator)
-            seal = digest(judge)[:12] if judge else "unknown"  # trained anew under the same name it is another measure
-            made = replace(made, protocol={**made.protocol, "evaluator file": seal})
+            judge = evaluator_file(job.evaluator)  # trained anew under the same name it is another measure
+            extra["evaluator file"] = digest(judge)[:12] if judge else "unknown"
         if job.quick:
-            made = replace(made, protocol={**made.protocol, "quick": True}, notes=(QUICK, *made.notes))
-        made = replace(made, protocol={**made.protocol, FILES: weight_marks(suite.weights(job))})
+            extra["quick"] = True
+            report = replace(report, notes=(QUICK, *report.notes))
+        extra[FILES] = weight_marks(suite.weights(job))
+        report = replace(report, protocol={**report.protocol, **extra})
         (folder / "done.json").unlink(missing_ok=True)  # a kill before the next line must not pair it with this report
-        reports.write(made, folder)
+        reports.write(report, folder)
         files.write_json(folder / "done.json", {"fingerprint": mark, "settings": dict(settings), "quick": job.quick})
     except NoData as nothing:
         return Outcome(suite, None, "skipped", str(nothing))
     except MotionloomError as error:
         return Outcome(suite, None, "failed", str(error))
-    return Outcome(suite, made, "measured")
+    return Outcome(suite, report, "measured")
 
 
 def fingerprint(suite: Suite, job: Job) -> str:
     """Changes with the version, the weights, the settings, and the files that a suite reads."""
     weights = weights_digest(find_weights(job.weights))
-    said: dict[str, Any] = {
+    about: dict[str, Any] = {
         "version": version("motionloom"),
         "suite": suite.name,
         "weights": weights,
         "settings": dict(suite.settings(job.quick)),
     }
-    said["files"] = [weights_digest(path) for path in suite.files(job)]
+    about["files"] = [weights_digest(path) for path in suite.files(job)]
     if suite.data and job.data is not None:
-        said["data"] = _files(job.data)
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        about["data"] = _files(job.data)
+    return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
 
 
 def _files(folder: Path) -> str:
     """Names and sizes of the files of a set: a changed set changes it, moving it does not."""
     if not folder.is_dir():
         raise MotionloomError(f"{folder} is no folder of clips; make a set with 'motionloom data build'")
-    listed = sorted((str(p.relative_to(folder)), p.stat().st_size) for p in folder.rglob("*") if p.is_file())
-    return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
+    sizes = sorted((str(p.relative_to(folder)), p.stat().st_size) for p in folder.rglob("*") if p.is_file())
+    return hashlib.sha256(json.dumps(sizes).encode()).hexdigest()
 
 
 def _finished(folder: Path, mark: str) -> Report | None:
     """The report of a finished run of these settings; anything else, damaged files too, is measured anew."""
     try:
-        done = plain_json(read_bytes(folder / "done.json", max_bytes=1 << 20))
-        if isinstance(done, dict) and done.get("fingerprint") == mark:
+        record = plain_json(read_bytes(folder / "done.json", max_bytes=1 << 20))
+        if isinstance(record, dict) and record.get("fingerprint") == mark:
             return reports.read(folder / "report.json")
     except (OSError, ValueError, RecursionError):
         pass

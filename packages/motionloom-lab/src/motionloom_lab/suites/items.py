@@ -28,7 +28,7 @@ from motionloom_train.data.sources import Take, listed_names, read_features
 from motionloom_train.data.words import check_caption
 
 LONGEST = 30 * FPS
-"""Frames: a collection's one line about a longer clip says too little about any part of it."""
+"""Frames: a collection's one line about a longer clip describes too little of any part of it."""
 SHORTEST = 0.8 * FPS
 
 
@@ -56,12 +56,12 @@ def real_clips(folder: Path | str) -> Iterator[RealClip]:
     A caption that somebody wrote for a stretch of a take goes before the collection's one line for the whole take.
     """
     folder = Path(folder)
-    found = False
+    empty = True
     for clip in plain_clips(folder):
         for real in _stretches(clip):
-            found = True
+            empty = False
             yield real
-    if not found:
+    if empty:
         raise MotionloomError(f"{folder} has no clips to compare with; make a set with 'motionloom data build'")
 
 
@@ -84,7 +84,7 @@ def plain_clips(
         try:
             yield from islice(clips_of(take), 1 + mirrored)
         except MotionloomError:
-            continue  # too short or damaged: `data build` says which
+            continue  # too short or damaged: `data build` reports which
 
 
 def _stretches(clip: Clip) -> Iterator[RealClip]:
@@ -107,7 +107,7 @@ _MAX_TEXT = 64 << 20
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A stretch of a recording and what people say it shows."""
+    """A stretch of a recording and its captions."""
 
     name: str
     source: str
@@ -118,7 +118,7 @@ class Item:
 
 
 def fitting(folder: Path | str, selection: Selection | None) -> Selection:
-    """What is selected where nothing was said: the test set of HumanML3D, of other folders `Selection`'s defaults."""
+    """What is selected by default: the test set of HumanML3D, of other folders `Selection`'s defaults."""
     if not (Path(folder) / "new_joint_vecs").is_dir():
         return selection or Selection()
     return replace(selection or Selection(splits=("test",)), sources=("humanml3d",))
@@ -133,21 +133,21 @@ def read_items(folder: Path | str, selection: Selection) -> list[Item]:
     if not folder.is_dir():
         raise MotionloomError(f"there is no folder {folder}; name a built set, recordings or a HumanML3D folder")
     if (folder / "new_joint_vecs").is_dir():
-        found = _humanml3d(folder, selection)
+        candidates = _humanml3d(folder, selection)
     else:
         clips = plain_clips(folder, mirrored=selection.mirrored, chosen=lambda take: _selected(take, selection))
-        found = (item for clip in clips if _selected(clip, selection) for item in _described(clip))
-    kept = [one for item in found if (one := fitted(item, selection)) is not None]
-    if len(kept) > MOST_ITEMS:
+        candidates = (item for clip in clips if _selected(clip, selection) for item in _described(clip))
+    items = [one for item in candidates if (one := fitted(item, selection)) is not None]
+    if len(items) > MOST_ITEMS:
         raise MotionloomError(
-            f"{folder} holds {len(kept)} items; at most {MOST_ITEMS} can be measured, so select fewer"
+            f"{folder} holds {len(items)} items; at most {MOST_ITEMS} can be measured, so select fewer"
         )
-    if not kept:
+    if not items:
         raise MotionloomError(
             f"{folder} holds no captioned stretch of {selection.shortest / FPS:g} to {selection.longest / FPS:g} s of "
             f"source {', '.join(selection.sources) or 'any'} in {', '.join(selection.splits)}; name another --data"
         )
-    return kept
+    return items
 
 
 def fitted(item: Item, selection: Selection) -> Item | None:
@@ -162,7 +162,7 @@ def fitted(item: Item, selection: Selection) -> Item | None:
 
 
 def cropped(frames: int, selection: Selection, name: str) -> int:
-    """The largest multiple of the unit in ``frames``; one unit less for a third of the names, where that is asked for.
+    """The largest multiple of the unit in ``frames``; one unit less for a third of the names, where that is selected.
 
     (Published: the coin is thrown anew each time; here it belongs to the name, so that real motions stay the same.)
     """
@@ -234,8 +234,8 @@ def _text(path: Path) -> str:
     try:
         return read_utf8(path, max_bytes=_MAX_TEXT, empty=True)
     except (OSError, MotionloomError) as error:
-        said = getattr(error, "strerror", None) or str(error)
-        raise MotionloomError(f"cannot read {path} ({said}); a HumanML3D folder has lists and texts") from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise MotionloomError(f"cannot read {path} ({reason}); a HumanML3D folder has lists and texts") from None
 
 
 class NoData(MotionloomError):
@@ -256,7 +256,7 @@ def pairs_of(data: Path | str | None, *, captions: bool = True, say: Say = silen
 
 
 def has_pairs(folder: Path) -> bool:
-    """Whether anything in a folder says that it belongs to a pair, by the layouts of `find_pairs`."""
+    """Whether anything in a folder belongs to a pair, by the layouts of `find_pairs`."""
     from motionloom_lab.papers.threedpw import is_3dpw
 
     if (folder / "manifest.csv").is_file():

@@ -1,6 +1,6 @@
-"""Ways to make one long motion of many prompts, by name: what the suite `transitions` holds against each other.
+"""Ways to make one long motion of many prompts, by name: what the suite `transitions` compares.
 
-Every way is asked for the same prompts and the same visible frames, and gives that many: frames of interval i stand
+Every way has the same prompts and the same visible frames, and gives that many: frames of interval i are
 between seam i - 1 and seam i. DoubleTake's rows share h frames, h / 2 on either side of a seam, so its rows are longer
 by h / 2 at each seam.
 """
@@ -43,17 +43,17 @@ Method: TypeAlias = Callable[[Sequence[str], Sequence[int], int], Long]
 
 def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) -> dict[str, Method]:
     """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not, and for none."""
-    wanted = list(dict.fromkeys(DEFAULT if names is None else names))
-    if not wanted:
+    chosen = list(dict.fromkeys(DEFAULT if names is None else names))
+    if not chosen:
         raise MotionloomError(f"no method is named; the methods are {', '.join(_MAKERS)}")
-    for name in wanted:
+    for name in chosen:
         if name not in _MAKERS:
             raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(_MAKERS)}")
 
     def method(name: str) -> Method:
-        return lambda prompts, frames, seed: _MAKERS[name][1](Wanted(prior, how, prompts, frames, seed))
+        return lambda prompts, frames, seed: _MAKERS[name][1](Request(prior, how, prompts, frames, seed))
 
-    return {name: method(name) for name in wanted}
+    return {name: method(name) for name in chosen}
 
 
 def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
@@ -64,20 +64,20 @@ def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
 
 
 def from_features(features: np.ndarray) -> Long:
-    """Features as the network draws them, decoded once."""
+    """Features as the network samples them, decoded once."""
     numbers = features.astype(np.float64)
     return Long(numbers, humanml.decode_positions(numbers))
 
 
 def from_positions(positions: Array) -> Long:
     """Positions (frames, 22, 3) with the features they encode to; the last frame, which has no next one, twice."""
-    found = humanml.encode(humanml.canonical(humanml.uniform(positions))).astype(np.float64)
-    return Long(np.concatenate([found, found[-1:]]), np.asarray(positions, dtype=np.float64))
+    rows = humanml.encode(humanml.canonical(humanml.uniform(positions))).astype(np.float64)
+    return Long(np.concatenate([rows, rows[-1:]]), np.asarray(positions, dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
-    """One long motion that is asked for."""
+class Request:
+    """What one long motion should be."""
 
     prior: Prior
     how: Transitions
@@ -97,43 +97,45 @@ class Wanted:
         return sample_features(self.prior, self.prompts, frames, seeds=seeds, **self.how.drawing)
 
 
-def _ours(wanted: Wanted) -> Long:
-    pieces = long_features(wanted.prior, wanted.segments, seed=wanted.seed, **wanted.how.drawing)
+def _ours(request: Request) -> Long:
+    pieces = long_features(request.prior, request.segments, seed=request.seed, **request.how.drawing)
     return from_features(np.concatenate(list(pieces)))
 
 
-def _exported(wanted: Wanted) -> Long:
+def _exported(request: Request) -> Long:
     """What a user gets: constant bones, planted feet held still."""
-    blocks = compose(wanted.prior, wanted.segments, seed=wanted.seed, **wanted.how.drawing)
+    blocks = compose(request.prior, request.segments, seed=request.seed, **request.how.drawing)
     return from_positions(np.concatenate([block.positions() for block in blocks]))
 
 
 def _double_take(
-    wanted: Wanted, mode: Literal["published", "paper"] = "published", **more: Unpack[TakeSettings]
+    request: Request, mode: Literal["published", "paper"] = "published", **more: Unpack[TakeSettings]
 ) -> Long:
-    how = wanted.how
+    how = request.how
     settings: TakeSettings = {**how.drawing, **more}
-    rows = rows_of(wanted.frames, how.handshake)
+    rows = rows_of(request.frames, how.handshake)
     joins = {"handshake": how.handshake, "ramp": how.blend}
-    made, _ = double_take_features(wanted.prior, wanted.prompts, rows, mode=mode, seed=wanted.seed, **joins, **settings)
-    return from_features(made)
+    features, _ = double_take_features(
+        request.prior, request.prompts, rows, mode=mode, seed=request.seed, **joins, **settings
+    )
+    return from_features(features)
 
 
-def _slerp(wanted: Wanted) -> Long:
+def _slerp(request: Request) -> Long:
     """The blank frames belong to the later segment, which is generated so much shorter, as TEACH has it."""
-    alone = wanted.alone([n - (BLANK if row else 0) for row, n in enumerate(wanted.frames)])
+    alone = request.alone([n - (BLANK if row else 0) for row, n in enumerate(request.frames)])
     motions = [motion_from_positions(from_features(features).positions, FPS) for features in alone]
     return from_positions(slerp_joined(motions).positions())
 
 
-_MAKERS: Mapping[str, tuple[str, Callable[[Wanted], Long]]] = {
+_MAKERS: Mapping[str, tuple[str, Callable[[Request], Long]]] = {
     "ours": ("motionloom compose, as drawn", _ours),
     "ours-exported": ("motionloom compose, as exported", _exported),
     "published": ("DoubleTake, published", _double_take),
     "paper": ("DoubleTake, paper", partial(_double_take, mode="paper")),
     "first-take": ("first take only", partial(_double_take, first_take_only=True)),
     "second-take": ("second take only", partial(_double_take, second_take_only=True)),
-    "concatenation": ("concatenation", lambda wanted: from_features(np.concatenate(wanted.alone(wanted.frames)))),
+    "concatenation": ("concatenation", lambda request: from_features(np.concatenate(request.alone(request.frames)))),
     "slerp": ("segments + SLERP", _slerp),
     "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
     "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),
@@ -141,7 +143,7 @@ _MAKERS: Mapping[str, tuple[str, Callable[[Wanted], Long]]] = {
 DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
 """Without second take only and without the slow ones of 1000 steps."""
 TITLES = {name: title for name, (title, _) in _MAKERS.items()}
-"""Names of the rows; the number of steps is said behind them."""
+"""Names of the rows; the number of steps follows them."""
 
 
 def titled(name: str, steps: int) -> str:

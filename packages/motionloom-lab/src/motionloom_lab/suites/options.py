@@ -28,30 +28,30 @@ class Command:
 @cache
 def commands() -> dict[str, Command]:
     """All commands by name."""
-    found = read_table("motionloom_lab.suites", "options.toml")
-    shared = found.pop("shared")
-    made = {}
-    for name, row in found.items():
+    table = read_table("motionloom_lab.suites", "options.toml")
+    shared = table.pop("shared")
+    result = {}
+    for name, row in table.items():
         rows = shared | row.get("own", {})
         options = tuple(Option.of(option, rows[option]) for option in row["options"])
-        made[name] = Command(name, row["help"], row.get("run", "measured"), options)
-    return made
+        result[name] = Command(name, row["help"], row.get("run", "measured"), options)
+    return result
 
 
-def typed(command: Command, given: Mapping[str, Any]) -> str:
+def typed(command: Command, args: Mapping[str, Any]) -> str:
     """What to type to measure the same again; where data lie differs between machines, so they are called SET."""
     by_name = {option.name: option for option in command.options}
     line = ["motionloom", "evaluate", command.name]
-    line += [str(given[option.dest]) for option in command.options if option.positional]
-    line += ["--weights", _word(given.get("weights", by_name["weights"].default))]
-    line += ["--data", by_name["data"].metavar or "SET"] if given.get("data") else []
+    line += [str(args[option.dest]) for option in command.options if option.positional]
+    line += ["--weights", _word(args.get("weights", by_name["weights"].default))]
+    line += ["--data", by_name["data"].metavar or "SET"] if args.get("data") else []
     for option in command.options:
         line += ["--out", option.metavar or "FOLDER"] if option.name == "out" and option.required else []
-        value = given.get(option.dest)
+        value = args.get(option.dest)
         if option.name in NOT_TYPED or option.positional or value in (None, False, [], option.default):
             continue
         line += _words(option, value)
-    return shlex.join([*line, *(["--quick"] if given.get("quick") else [])])
+    return shlex.join([*line, *(["--quick"] if args.get("quick") else [])])
 
 
 def _words(option: Option, value: Any) -> list[str]:

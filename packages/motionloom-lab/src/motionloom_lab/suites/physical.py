@@ -38,8 +38,8 @@ def obedience_report(
     every = [a for result in results for a in result.attempts]
     prompts = {check.prompt for check in checks}
     total = _shares([a for a in every if a.prompt in prompts], [a for a in every if a.prompt not in prompts])
-    found = obey.totals(results, checks)
-    note = f"{found['prompts_obeyed']} of {found['prompts']} prompts are obeyed on {obey.ENOUGH:.0%} of their seeds."
+    totals = obey.totals(results, checks)
+    note = f"{totals['prompts_obeyed']} of {totals['prompts']} prompts are obeyed on {obey.ENOUGH:.0%} of their seeds."
     protocol = {"checks": obey.fingerprint(checks), **settings}
     title = "Obedience: does it do what the words say"
     return run.report("obedience", title, protocol, (Row("all prompts", total), *rows), (note,))
@@ -66,13 +66,13 @@ def realism_value(clips: Sequence[Array], fps: float) -> dict[str, Value]:
     picks = np.random.default_rng(0).integers(len(clips), size=(RESAMPLES, len(clips)))
     weighted = np.einsum("rc,rck->rk", lengths[picks], rows[picks]) / lengths[picks].sum(axis=1)[:, None]
     middle = np.median(rows[picks], axis=1)
-    drawn = np.where([n.typical for n in NUMBERS], middle, weighted)
-    spread = 1.96 * drawn.std(axis=0, ddof=1) if len(clips) > 1 else np.full(len(NUMBERS), np.nan)
+    samples = np.where([n.typical for n in NUMBERS], middle, weighted)
+    spread = 1.96 * samples.std(axis=0, ddof=1) if len(clips) > 1 else np.full(len(NUMBERS), np.nan)
     return {n.name: Value(means[n.name], float(s), len(clips)) for n, s in zip(NUMBERS, spread, strict=True)}
 
 
 def realism_report(
-    made: Mapping[str, Sequence[Array]],
+    groups: Mapping[str, Sequence[Array]],
     fps: float,
     real: Sequence[Array] | Mapping[str, float],
     *,
@@ -83,7 +83,7 @@ def realism_report(
 
     Bodies are held against recorded people (`bodies.known`), whatever the clips are.
     """
-    shown = [
+    heads = [
         Column(n.name, n.name.replace("_", " "), "real" if n.both_ways else "down", n.meaning, _digits(n.unseen))
         for n in NUMBERS
     ]
@@ -93,28 +93,32 @@ def realism_report(
     else:
         rows.append(Row(REAL, realism_value(real, FPS)))
         meaning = "m/s, Wasserstein-1 distance of the pelvis speeds of all frames to the real ones"
-        shown.append(Column("speed_distance", "speed distance", "down", meaning, 3))
-    reach, said = bodies.known(), []
+        heads.append(Column("speed_distance", "speed distance", "down", meaning, 3))
+    reach, sentences = bodies.known(), []
     people = {f"body_{name}": Value(percentiles[2]) for name, percentiles in reach.items()}
     rows = [Row(row.name, {**row.values, **people}) for row in rows]
-    for name, clips in made.items():
+    for name, clips in groups.items():
         held = bodies.judge(clips, reach)
         values = realism_value(clips, fps) | body_values(held, len(clips))
-        said.append(f"{name}: {held['passed']} of {held['of']} numbers of the body are within what recorded people do.")
+        sentences.append(
+            f"{name}: {held['passed']} of {held['of']} numbers of the body are within what recorded people do."
+        )
         if not isinstance(real, Mapping) and fps == FPS:
             values["speed_distance"] = Value(speed_distance(list(clips), list(real), FPS))
         rows.append(Row(name, values))
-    said += notes("realism")
-    shown += columns("realism-body")
-    return run.report("realism", "Realism: does it move like real people", protocol, rows, said, columns=tuple(shown))
+    sentences += notes("realism")
+    heads += columns("realism-body")
+    return run.report(
+        "realism", "Realism: does it move like real people", protocol, rows, sentences, columns=tuple(heads)
+    )
 
 
 def body_values(held: Mapping[str, Any], count: int) -> dict[str, Value]:
     """The columns of bodies out of `bodies.judge`'s answer for so many clips."""
     numbers = held["numbers"]
-    found = {name: n["median"] for name, n in numbers.items() if "median" in n}
-    found |= {"whole": numbers["whole"]["share"], "bones": numbers["bones"]["stretched"]}
-    return {f"body_{name}": Value(value, count=count) for name, value in found.items()}
+    values = {name: n["median"] for name, n in numbers.items() if "median" in n}
+    values |= {"whole": numbers["whole"]["share"], "bones": numbers["bones"]["stretched"]}
+    return {f"body_{name}": Value(value, count=count) for name, value in values.items()}
 
 
 def _digits(unseen: float) -> int:
@@ -132,19 +136,19 @@ def realism_orders(data: Path | None, count: int) -> tuple[list[realism.Order], 
     return realism.orders(chosen), [clip.positions for clip in chosen], about
 
 
-def speed_report(found: Mapping[str, Any], *, run: Run) -> Report:
+def speed_report(results: Mapping[str, Any], *, run: Run) -> Report:
     """`motionloom bench`'s numbers as a report of one row, each number with its target."""
-    machine = {name: value for name, value in found["machine"].items() if name != "load"}
-    shown, values = [], {}
-    for k, entry in enumerate(found["entries"]):
+    machine = {name: value for name, value in results["machine"].items() if name != "load"}
+    heads, values = [], {}
+    for k, entry in enumerate(results["entries"]):
         name = "".join(c if c.isalnum() else "_" for c in entry["name"]).strip("_") or f"entry_{k}"
         better = "down" if "<" in entry["target"] else "up"
         digits = 0 if abs(entry["value"]) >= 100 else 1 if abs(entry["value"]) >= 10 else 3
-        shown.append(Column(name, f"{entry['name']}, {entry['unit']}", better, f"target {entry['target']}", digits))
+        heads.append(Column(name, f"{entry['name']}, {entry['unit']}", better, f"target {entry['target']}", digits))
         values[name] = Value(entry["value"])
-    notes = [f"{entry['name']}: {entry['note']}" for entry in found["entries"] if entry["note"]]
-    if found["machine"]["load"] > 0.5:
-        notes.append(f"The machine was busy when this began (load {found['machine']['load']}).")
-    protocol = {"machine": machine, "repeats": "few" if found["quick"] else "full"}
+    notes = [f"{entry['name']}: {entry['note']}" for entry in results["entries"] if entry["note"]]
+    if results["machine"]["load"] > 0.5:
+        notes.append(f"The machine was busy when this began (load {results['machine']['load']}).")
+    protocol = {"machine": machine, "repeats": "few" if results["quick"] else "full"}
     title = "Speed: time and memory as ratios within one run"
-    return run.report("speed", title, protocol, [Row("this machine", values)], notes, columns=tuple(shown))
+    return run.report("speed", title, protocol, [Row("this machine", values)], notes, columns=tuple(heads))

@@ -110,8 +110,8 @@ def measure(
 ) -> Report:
     """The report of a predictor on a trial; ``about``: further settings that change the numbers."""
     run = run or Run("predictor")
-    said = protocol_of(trial, how, predictor) | dict(about or {})
-    parts = run.parts({**said, **asdict(how), "windows chosen": _identity(trial)})
+    protocol = protocol_of(trial, how, predictor) | dict(about or {})
+    parts = run.parts({**protocol, **asdict(how), "windows chosen": _identity(trial)})
     rows = []
     for title, way, repeats in _ways(predictor, trial, how, kinds, label=run.label):
 
@@ -128,7 +128,7 @@ def measure(
         rows.append(row_of(title, replicated(title, repeats, scored, parts, str), COLUMNS))
     others = _published(trial, how, [c.name for c in COLUMNS]) if with_published else ()
     title = "Prediction: many futures of what was seen"
-    return run.report("prediction", title, said, (*rows, *others), _notes(trial))
+    return run.report("prediction", title, protocol, (*rows, *others), _notes(trial))
 
 
 def as_published(predictor: Predictor, seed: int, *, samples: int, steps: int) -> Way:
@@ -148,12 +148,12 @@ def _ways(
     """Name, the way of each seed (None: real futures), and how often it is measured."""
     frames, many = trial.protocol.future, how.published_steps
     again = how.replications
-    drawn = PredictionSampling(count=how.samples, guidance=how.guidance, batch_size=trials.ROWS)
+    sampling = PredictionSampling(count=how.samples, guidance=how.guidance, batch_size=trials.ROWS)
 
     def sampled(seed: int, steps: int) -> Way:
-        return partial(futures, predictor, sampling=replace(drawn, seed=seed, steps=steps))
+        return partial(futures, predictor, sampling=replace(sampling, seed=seed, steps=steps))
 
-    found: dict[str, tuple[str, Callable[[int], Way] | None, int]] = {
+    ways: dict[str, tuple[str, Callable[[int], Way] | None, int]] = {
         "real": (REAL, None, 1),
         "zero": (ZERO, lambda seed: by_rule(metrics.zero_velocity, frames), 1),
         "constant": (CONSTANT, lambda seed: by_rule(metrics.constant_velocity, frames), 1),
@@ -166,7 +166,7 @@ def _ways(
         ),
     }
     same = how.steps == many
-    return [found[kind] for kind in KINDS if kind in kinds and not (same and kind == "ours-many" and "ours" in kinds)]
+    return [ways[kind] for kind in KINDS if kind in kinds and not (same and kind == "ours-many" and "ours" in kinds)]
 
 
 def protocol_of(trial: PredictionTrial, how: PredictionSettings, predictor: Predictor) -> dict[str, Any]:
@@ -206,11 +206,11 @@ def _notes(trial: PredictionTrial) -> tuple[str, ...]:
 
 def _published(trial: PredictionTrial, how: PredictionSettings, names: Sequence[str]) -> tuple[Row, ...]:
     """What others published, marked where it was measured on what was measured here."""
-    called, windows = WHOLE.get(trial.protocol.name, ("", None))
+    name, windows = WHOLE.get(trial.protocol.name, ("", None))
     whole = len(trial.windows) == len(trial.every) and windows in (None, len(trial.every))
-    same = bool(called) and whole and how.samples == 50 and how.singles == "all"
+    same = bool(name) and whole and how.samples == 50 and how.singles == "all"
     rows = published("prediction", names)
     return tuple(
-        replace(row, measured_on=SAME + row.measured_on) if same and row.measured_on.startswith(called) else row
+        replace(row, measured_on=SAME + row.measured_on) if same and row.measured_on.startswith(name) else row
         for row in rows
     )

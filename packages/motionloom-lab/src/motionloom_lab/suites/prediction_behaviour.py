@@ -1,6 +1,6 @@
 """What a predictor does over long times, with parts held, and on the way to a target: studies of given weights.
 
-Every function takes a `Lab` and a predictor, and gives columns, rows and what to say of the settings;
+Every function takes a `Lab` and a predictor, and gives columns, rows and further settings;
 `prediction_studies` writes them.
 """
 
@@ -33,7 +33,7 @@ from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, from_
 from motionloom_train.data.prediction import Protocol
 from motionloom_train.data.progress import Say, silent
 
-Found = tuple[Sequence[Column], list[Row], dict[str, Any]]
+Findings = tuple[Sequence[Column], list[Row], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -69,34 +69,34 @@ GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body
 TRANSITIONS = (0.5, 1.0, 2.0)
 
 
-def horizon(lab: Lab, predictor: Predictor) -> Found:
+def horizon(lab: Lab, predictor: Predictor) -> Findings:
     """Futures that go on from themselves, second by second: do they freeze, do they drift."""
     protocol, budget = lab.protocol, lab.budget
     trial = trials.prepare(protocol, count=budget.windows)
-    made = long_futures(predictor, trial, budget, say=lab.say)
+    samples = long_futures(predictor, trial, budget, say=lab.say)
     known = _known_poses(protocol)
     real = np.stack([trial.future(k) for k in range(len(trial.windows))])
     rows = [plain_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
     second = round(protocol.fps)
-    for start in range(0, made.shape[2] - second + 1, second):
-        part = made[:, :, start : start + second]
+    for start in range(0, samples.shape[2] - second + 1, second):
+        part = samples[:, :, start : start + second]
         numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
         spread = {"spread": _spread(part, protocol.layout)} if budget.samples > 1 else {}
         rows.append(plain_row(f"second {start // second + 1}", numbers | spread))
-    said = {"weights": predictor.card.name, "seconds": budget.seconds, "training poses": len(known)}
-    return columns("study-horizon"), rows, said
+    about = {"weights": predictor.card.name, "seconds": budget.seconds, "training poses": len(known)}
+    return columns("study-horizon"), rows, about
 
 
 def long_futures(predictor: Predictor, trial: PredictionTrial, budget: Budget, say: Say = silent) -> Array:
     """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
     count, fps = len(trial.windows), predictor.fps
     person = np.repeat(trial.pasts(0, count), budget.samples, axis=0)
-    turns, made = int(np.ceil(budget.seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
+    turns, pieces = int(np.ceil(budget.seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
     sampler = WindowSampler(predictor, PredictionSampling())
     for turn, new in enumerate(sampler.windows(person, [(budget.seed, i) for i in range(len(person))], None, turns)):
         say(f"window {turn + 1} of {turns}")
-        made.append(new)
-    whole = np.concatenate(made, axis=1)[:, : round(budget.seconds * fps)]
+        pieces.append(new)
+    whole = np.concatenate(pieces, axis=1)[:, : round(budget.seconds * fps)]
     return whole.reshape(count, budget.samples, *whole.shape[1:])
 
 
@@ -146,7 +146,7 @@ def _spread(motions: Array, layout: Layout) -> float:
     return float(np.mean(apart) / np.sqrt(poses.shape[-1] / 3)) if apart else 0.0
 
 
-def hold(lab: Lab, predictor: Predictor) -> Found:
+def hold(lab: Lab, predictor: Predictor) -> Findings:
     """Each group of joints given in all of the future: how much nearer the others come, how they vary."""
     _need_person(predictor)
     trial = trials.prepare(lab.protocol, count=lab.budget.windows)
@@ -171,10 +171,10 @@ def held_numbers(
     for number in range(len(trial.windows)):
         past, truth = trial.pasts(number, number + 1).repeat(samples, 0), trial.future(number)
         without = next_frames(predictor, past, seeds=seeds, exact=False)
-        given = next_frames(predictor, past, seeds=seeds, known=Known(truth, mask), exact=False)
-        real, a, b = from_root(truth), from_root(without), from_root(given)
+        fixed = next_frames(predictor, past, seeds=seeds, known=Known(truth, mask), exact=False)
+        real, a, b = from_root(truth), from_root(without), from_root(fixed)
         off = np.abs(b - real)[:, :, [j - 1 for j in joints if j]].max(initial=0.0)
-        off = max(off, np.abs(given[:, :, 0] - truth[:, 0]).max() if 0 in joints else 0.0)
+        off = max(off, np.abs(fixed[:, :, 0] - truth[:, 0]).max() if 0 in joints else 0.0)
         rows.append(
             (
                 metrics.ade(a[:, :, free], real[:, free]),
@@ -194,19 +194,19 @@ def held_numbers(
 
 def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, group: str, *, seed: int) -> float:
     """Largest difference between a held rotation in the motion that `predict` gives and the one it was held to."""
-    seen, joints = trial.protocol.observed, [j for j in SMPL22.groups[group] if j]
+    lead, joints = trial.protocol.observed, [j for j in SMPL22.groups[group] if j]
     whole = motion_from_positions(
         np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)]), predictor.fps
     )
-    source = whole.frames(seen, len(whole))
+    source = whole.frames(lead, len(whole))
     held = FixedJoints(source, (FixedPart((group,)),), align=False)
     seconds = len(source) / predictor.fps
-    (made,) = predict(predictor, whole.frames(0, seen), count=1, seconds=seconds, seed=seed, hold=held)
-    got, wanted = made.rotations[seen:, joints], source.rotations[:, joints]
-    return float(np.minimum(np.abs(got - wanted).max(-1), np.abs(got + wanted).max(-1)).max())
+    (motion,) = predict(predictor, whole.frames(0, lead), count=1, seconds=seconds, seed=seed, hold=held)
+    own, target = motion.rotations[lead:, joints], source.rotations[:, joints]
+    return float(np.minimum(np.abs(own - target).max(-1), np.abs(own + target).max(-1)).max())
 
 
-def arrive(lab: Lab, predictor: Predictor) -> Found:
+def arrive(lab: Lab, predictor: Predictor) -> Findings:
     """The way from one recording to another, for transitions of several lengths."""
     protocol, budget = lab.protocol, lab.budget
     _need_person(predictor)
@@ -218,30 +218,30 @@ def arrive(lab: Lab, predictor: Predictor) -> Found:
         motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
         for k in range(count)
     ]
-    seen, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
-    middle = seen + protocol.future // 2
-    rows = [plain_row(REAL, _mean([_ends(c.positions(), seen, middle, predictor.fps) for c in clips]))]
+    lead, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
+    middle = lead + protocol.future // 2
+    rows = [plain_row(REAL, _mean([_ends(c.positions(), lead, middle, predictor.fps) for c in clips]))]
     cut = []
     for a, b in pairs:
-        p, q = clips[a].positions()[:seen], clips[b].positions()[seen:]
+        p, q = clips[a].positions()[:lead], clips[b].positions()[lead:]
         p, q = protocol.layout.place(p[-1]).into(p), protocol.layout.place(q[0]).into(q)
-        cut.append(_seam(np.concatenate([p, q]), seen, predictor.fps, "start"))
+        cut.append(_seam(np.concatenate([p, q]), lead, predictor.fps, "start"))
     rows.append(plain_row("cut", _mean(cut)))
     for length in TRANSITIONS:
         lab.say(f"switch in {length:g} s: {len(pairs)} pairs")
-        found = []
+        numbers = []
         for a, b in pairs:
-            past, target = clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b]))
+            past, target = clips[a].frames(0, lead), clips[b].frames(lead, len(clips[b]))
             for i in range(budget.samples):
-                found.append(switched(predictor, past, target, seconds=length, seed=budget.seed + i))
-        rows.append(plain_row(f"{length:g} s", _mean(found)))
+                numbers.append(switched(predictor, past, target, seconds=length, seed=budget.seed + i))
+        rows.append(plain_row(f"{length:g} s", _mean(numbers)))
     return columns("study-switch"), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
 
 
 def switched(predictor: Predictor, past: Motion, target: Motion, *, seconds: float, seed: int) -> dict[str, float]:
     """Numbers of one transition."""
-    (made,) = switch(predictor, past, target, count=1, seconds=seconds, seed=seed)
-    places, first, fps = made.positions(), len(made) - len(target), predictor.fps
+    (motion,) = switch(predictor, past, target, count=1, seconds=seconds, seed=seed)
+    places, first, fps = motion.positions(), len(motion) - len(target), predictor.fps
     own = own_poses(np.stack([places[first], target.positions()[0]]), SMPL_LAYOUT)
     return _ends(places, len(past), first, fps) | {"target": float(np.abs(own[0] - own[1]).max())}
 
@@ -253,12 +253,12 @@ def _ends(places: Array, start: int, end: int, fps: float) -> dict[str, float]:
 
 
 def _seam(places: Array, at: int, fps: float, name: str) -> dict[str, float]:
-    found = seam(from_root(places[:at]), from_root(places[at:])[None], fps)
-    return {f"{name}_velocity": found.velocity, f"{name}_acceleration": found.acceleration}
+    jump = seam(from_root(places[:at]), from_root(places[at:])[None], fps)
+    return {f"{name}_velocity": jump.velocity, f"{name}_acceleration": jump.acceleration}
 
 
-def _mean(found: list[dict[str, float]]) -> dict[str, float]:
-    return {key: float(np.mean([one[key] for one in found])) for key in found[0]}
+def _mean(rows: list[dict[str, float]]) -> dict[str, float]:
+    return {key: float(np.mean([one[key] for one in rows])) for key in rows[0]}
 
 
 def _need_person(predictor: Predictor) -> None:
@@ -266,4 +266,4 @@ def _need_person(predictor: Predictor) -> None:
         raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
 
 
-STUDIES: dict[str, Callable[[Lab, Predictor], Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}
+STUDIES: dict[str, Callable[[Lab, Predictor], Findings]] = {"horizon": horizon, "hold": hold, "switch": arrive}

@@ -23,7 +23,7 @@ from motionloom_lab.report.report import REAL, Column, Report, Row, Value
 from motionloom_lab.suites import prediction, prediction_behaviour
 from motionloom_lab.suites import prediction_trial as trials
 from motionloom_lab.suites.harness import Run, weight_marks
-from motionloom_lab.suites.prediction_behaviour import Budget, Found, Lab
+from motionloom_lab.suites.prediction_behaviour import Budget, Findings, Lab
 from motionloom_lab.suites.prediction_trial import PredictionTrial
 from motionloom_lab.suites.protocol import check_ranges, reported
 from motionloom_train.loop import Training, changed
@@ -53,16 +53,16 @@ TITLES = {
 }
 MOST = 1_000_000
 SPREADS = ("index", "early", "snr")
-SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
+MEASURES = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
 
 
 def budget(name: str, *, quick: bool = False, changes: Mapping[str, int] | None = None) -> Budget:
     """The usual budget of a study with ``changes`` of `Budget`; raises MotionloomError for what cannot be."""
     usual = {"steps": Budget(16, 10), "horizon": Budget(16, 4), "hold": Budget(16, 8), "switch": Budget(24, 1)}
-    found = Budget(4, 2, 20, seconds=4.0, walks=(2, 4)) if quick else usual.get(name, Budget(64, 20))
-    found = replace(found, **(changes or {}))  # type: ignore[arg-type]
-    check_ranges(found, {"windows": (1, MOST), "samples": (1, MOST), "train_steps": (1, MOST)})
-    return found
+    chosen = Budget(4, 2, 20, seconds=4.0, walks=(2, 4)) if quick else usual.get(name, Budget(64, 20))
+    chosen = replace(chosen, **(changes or {}))  # type: ignore[arg-type]
+    check_ranges(chosen, {"windows": (1, MOST), "samples": (1, MOST), "train_steps": (1, MOST)})
+    return chosen
 
 
 def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget: Budget) -> Report:
@@ -86,26 +86,28 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
     trained = name in STUDIED
     predictor = None if trained else Predictor.load(run.weights, device=run.device)
     if trained or name == "horizon":
-        read = find_protocol(
+        data = find_protocol(
             run.data, name=protocol, say=run.progress, splits=("train", "val", "test") if trained else ("train", "test")
         )
     else:
-        read = trials.read_test(run.data, protocol, say=run.progress)
+        data = trials.read_test(run.data, protocol, say=run.progress)
     if predictor is not None:
-        trials.check_fit(predictor, read)
-    lab = Lab(read, budget, keep, run.device, run.progress)
-    found = replace(study(name, lab, predictor), command=run.command)
+        trials.check_fit(predictor, data)
+    lab = Lab(data, budget, keep, run.device, run.progress)
+    report = replace(study(name, lab, predictor), command=run.command)
     if not trained:
-        found = replace(found, protocol={**found.protocol, results.FILES: weight_marks([find_predictor(run.weights)])})
-    write(found, name, run.folder)
-    return found
+        report = replace(
+            report, protocol={**report.protocol, results.FILES: weight_marks([find_predictor(run.weights)])}
+        )
+    write(report, name, run.folder)
+    return report
 
 
 def study(name: str, lab: Lab, predictor: Predictor | None = None) -> Report:
     """The report of a study; ``predictor``: the given weights, None where networks are trained."""
-    given = prediction_behaviour.STUDIES | {"steps": _steps}
-    columns, rows, said = _trained(name, lab) if predictor is None else given[name](lab, predictor)
-    about = reported("study", {"data": lab.protocol, "budget": lab.budget}) | said
+    studies = prediction_behaviour.STUDIES | {"steps": _steps}
+    columns, rows, settings = _trained(name, lab) if predictor is None else studies[name](lab, predictor)
+    about = reported("study", {"data": lab.protocol, "budget": lab.budget}) | settings
     return Report(f"study-{name}", TITLES[name], "", about, tuple(columns), tuple(rows))
 
 
@@ -119,7 +121,7 @@ def write(report: Report, name: str, folder: Path) -> None:
     picture = f"\n![{report.title}]({name}.png)\n"
     page = reports.markdown(report) + picture
     if results.FILES in report.protocol:
-        place = f"{results.opening(report, 'figures')}{results.shown(report)}{picture}<!-- end -->\n"
+        place = f"{results.opening(report, 'figures')}{results.as_section(report)}{picture}<!-- end -->\n"
         page = f"# {report.title}\n\n{place}"
     files.write_text(folder / f"{name}.md", page)
     files.write_json(path, reports.encode(report))
@@ -128,7 +130,7 @@ def write(report: Report, name: str, folder: Path) -> None:
 # Networks that differ in one thing
 
 
-def _trained(name: str, lab: Lab) -> Found:
+def _trained(name: str, lab: Lab) -> Findings:
     setting, values = STUDIED[name]
     trial = trials.prepare(lab.protocol, count=lab.budget.windows)
     rows = [_row(REAL, trials.score(trial, None))]
@@ -148,7 +150,7 @@ def _trained(name: str, lab: Lab) -> Found:
         "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",
         "sampler": f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said",
     }
-    return [*_columns(SHOWN), size], rows, about
+    return [*_columns(MEASURES), size], rows, about
 
 
 def network(lab: Lab, setting: str, value: Any) -> Predictor:
@@ -179,34 +181,34 @@ def network(lab: Lab, setting: str, value: Any) -> Predictor:
         raise MotionloomError(f"{folder} holds a network of other settings; name another folder with --keep")
     place = folder / f"{name}.safetensors"
     if not place.is_file() or load_predictor(place).card.notes.get("steps") != steps:
-        said = lambda line: lab.say(f"{name}: {line}")  # noqa: E731
-        train_predictor(Training(recipe, folder, lab.device, say=said), lab.protocol)
+        say = lambda line: lab.say(f"{name}: {line}")  # noqa: E731
+        train_predictor(Training(recipe, folder, lab.device, say=say), lab.protocol)
     return load_predictor(place).to(lab.device)
 
 
 # Given weights
 
 
-def _steps(lab: Lab, predictor: Predictor) -> Found:
+def _steps(lab: Lab, predictor: Predictor) -> Findings:
     trial = trials.prepare(lab.protocol, count=lab.budget.windows)
     walks = [n for n in lab.budget.walks if n < predictor.schedule.steps]
     rows = [_row(REAL, trials.score(trial, None))]
     for solver in ("ddim", "dpm2m"):
         for spacing in SPREADS:
-            found: dict[int, dict[str, float]] = {}
+            scores: dict[int, dict[str, float]] = {}
             for steps in reversed(walks):
                 lab.say(f"{solver}, {spacing}, {steps} steps")
                 how = PredictionSampling(steps=steps, solver=solver, spacing=spacing)
-                found[steps] = _scored(lab, trial, predictor, how)
-            most = found[max(walks)]
+                scores[steps] = _scored(lab, trial, predictor, how)
+            most = scores[max(walks)]
             for steps in walks:
-                ratios = {f"{k}_ratio": found[steps][k] / most[k] for k in ("ade", "fde", "jerk") if most[k] > 0}
-                rows.append(_row(f"{solver}, {spacing}, {steps} steps", found[steps] | ratios))
-    said = f"over {max(walks)} steps of the same solver and spacing"
+                ratios = {f"{k}_ratio": scores[steps][k] / most[k] for k in ("ade", "fde", "jerk") if most[k] > 0}
+                rows.append(_row(f"{solver}, {spacing}, {steps} steps", scores[steps] | ratios))
+    meaning = f"over {max(walks)} steps of the same solver and spacing"
     ratios = [
-        Column(f"{k}_ratio", f"{k.upper() if k != 'jerk' else k} ratio", "", said) for k in ("ade", "fde", "jerk")
+        Column(f"{k}_ratio", f"{k.upper() if k != 'jerk' else k} ratio", "", meaning) for k in ("ade", "fde", "jerk")
     ]
-    return [*_columns(SHOWN), *ratios], rows, {"weights": predictor.card.name}
+    return [*_columns(MEASURES), *ratios], rows, {"weights": predictor.card.name}
 
 
 def _scored(lab: Lab, trial: PredictionTrial, predictor: Predictor, how: PredictionSampling) -> dict[str, float]:
@@ -220,4 +222,6 @@ def _columns(names: Sequence[str]) -> list[Column]:
 
 
 def _row(name: str, numbers: dict[str, float]) -> Row:
-    return Row(name, {key: Value(value) for key, value in numbers.items() if key in SHOWN or key not in trials.KNOWN})
+    return Row(
+        name, {key: Value(value) for key, value in numbers.items() if key in MEASURES or key not in trials.KNOWN}
+    )

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Way = Callable[[Array], Array]
 
 ROWS = 512
-"""Futures made and scored at once: 33 MB of 60 frames of 22 joints."""
+"""Futures sampled and scored at once: 33 MB of 60 frames of 22 joints."""
 OF_REAL = (
     "jerk",
     "jerk_peak",
@@ -92,16 +92,16 @@ def read_test(data: Path | str, name: str | None = None, *, say: Say = silent) -
     clips = Path(data) / "clips"
     if name not in (None, "cmu") or not clips.is_dir():
         return find_protocol(data, name=name, splits=("test",), say=say)
-    found = []
+    takes = []
     for path in finished(clips, "*.safetensors"):
         plain = path.stem.split("_")[0] in CMU_TEST and not path.stem.endswith(("_looped", "_reversed"))
         clip = read_clip(path) if plain else None
         if clip and clip.source == "cmu" and clip.way == "plain":
             places = clip.positions()
-            said = next((note.texts[0] for note in clip.notes if note.kind == "index" and note.texts), "motion")
+            action = next((note.texts[0] for note in clip.notes if note.kind == "index" and note.texts), "motion")
             turned = humanml.resample_positions(places, FPS, target=30.0).astype(np.float32)
-            found.append(Recording(clip.name, clip.name.split("_")[0], said, "test", turned))
-    return checked(data, Protocol("cmu, built set", 30.0, 30, 60, SMPL_LAYOUT, tuple(found), "as the set's"))
+            takes.append(Recording(clip.name, clip.name.split("_")[0], action, "test", turned))
+    return checked(data, Protocol("cmu, built set", 30.0, 30, 60, SMPL_LAYOUT, tuple(takes), "as the set's"))
 
 
 def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Singles = "all") -> PredictionTrial:
@@ -143,8 +143,8 @@ def check_fit(predictor: Predictor, protocol: Protocol) -> None:
     its = protocol.layout.joints, protocol.fps, protocol.observed, protocol.frames
     if mine != its or predictor.layout.names != protocol.layout.names:
         sizes = [
-            f"{joints} joints at {fps:g} fps, {seen} of {frames} frames seen"
-            for joints, fps, seen, frames in (mine, its)
+            f"{joints} joints at {fps:g} fps, {observed} of {frames} frames seen"
+            for joints, fps, observed, frames in (mine, its)
         ]
         raise MotionloomError(
             f"these weights are for {sizes[0]}, and {protocol.name} has {sizes[1]}; name weights trained on such data"
@@ -166,25 +166,25 @@ def score(
     """
     tally, ways, seconds = metrics.Tally(trial.singles), list[tuple[float, float]](), 0.0
     variety: list[float] = []
-    for number, made, took in _predicted(trial, way, chunk or max(1, ROWS // max(samples, 1)), say):
+    for number, motions, took in _predicted(trial, way, chunk or max(1, ROWS // max(samples, 1)), say):
         truth, past = trial.future(number), trial.pasts(number, number + 1)[0]
         near = trial.futures(number)
         scores = metrics.score_window(
-            from_root(made), from_root(truth), near, fps=trial.protocol.fps, past=from_root(past), limbs=trial.limbs
+            from_root(motions), from_root(truth), near, fps=trial.protocol.fps, past=from_root(past), limbs=trial.limbs
         )
         tally.add(scores, trial.windows[number][0].action)
-        off = np.linalg.norm(made[:, :, 0] - truth[None, :, 0], axis=-1)
+        off = np.linalg.norm(motions[:, :, 0] - truth[None, :, 0], axis=-1)
         ways.append((off.mean(axis=1).min(), off[:, -1].min()))  # ADE and FDE of the root's way
         seconds += took
         if way is None and len(near) > 1:
             variety.append(metrics.apd(near))
-    found = {name: average.value for name, average in tally.averages().items() if way or name in OF_REAL}
-    found["cmd"] = tally.cmd.result(trial.speeds)
+    numbers = {name: average.value for name, average in tally.averages().items() if way or name in OF_REAL}
+    numbers["cmd"] = tally.cmd.result(trial.speeds)
     if way is None:
-        return found | ({"apd": float(np.mean(variety))} if variety else {})
+        return numbers | ({"apd": float(np.mean(variety))} if variety else {})
     if root:
-        found["root_ade"], found["root_fde"] = (float(x) for x in np.mean(ways, axis=0))
-    return found | {"seconds": seconds / len(trial.windows)}
+        numbers |= zip(("root_ade", "root_fde"), np.mean(ways, axis=0).tolist())
+    return numbers | {"seconds": seconds / len(trial.windows)}
 
 
 def _predicted(trial: PredictionTrial, way: Way | None, chunk: int, say: Say) -> Iterator[tuple[int, Array, float]]:
@@ -197,10 +197,10 @@ def _predicted(trial: PredictionTrial, way: Way | None, chunk: int, say: Say) ->
                 yield number, trial.future(number)[None], 0.0
             continue
         began = time.perf_counter()
-        made = way(trial.pasts(first, last))
+        motions = way(trial.pasts(first, last))
         took = (time.perf_counter() - began) / (last - first)
         for number in range(first, last):
-            yield number, made[number - first], took
+            yield number, motions[number - first], took
         if time.perf_counter() - reported > EVERY:
             reported = time.perf_counter()
             say(f"window {last} of {len(trial.windows)}")

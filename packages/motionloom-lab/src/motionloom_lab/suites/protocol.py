@@ -22,7 +22,7 @@ RECORDED = ("cmu", "accad", "ui_prmd")
 PUBLISHED_CAPTION = 22
 """Tokens: the caption length that MDM before January 2024 and PriorMDM gave their evaluator for generated motions."""
 STRIDE = 1 << 32
-"""Between the first seeds of two replications; what a replication draws stays below it."""
+"""Between the first seeds of two replications; the seeds of a replication stay below it."""
 MOST_STEPS, MOST_REPLICATIONS, MOST_ITEMS = 12, 1000, 100_000
 GUIDANCES = (-100, 100)
 """Others make no motion; usual values are 1 to 7."""
@@ -42,11 +42,11 @@ class Selection:
     shortest: int = 40
     """Frames."""
     longest: int = 196
-    """Frames; up to four more are cut off, and what is longer is left out: its caption says too little of a part."""
+    """Frames; up to four more are cut off, and what is longer is left out: its caption is too coarse for a part."""
     unit: int = 4
     """Lengths are cropped to multiples of it; 1 keeps them."""
     shorter_third: bool = False
-    """A third of the lengths is one unit shorter, as the published loader draws them."""
+    """A third of the lengths is one unit shorter, as the published loader chooses them."""
 
     def __post_init__(self) -> None:
         if not self.splits or not set(self.splits) <= set(SPLITS):
@@ -135,14 +135,14 @@ class Transitions:
 
 
 class LongDrawing(TypedDict):
-    """How long motions are drawn."""
+    """How long motions are sampled."""
 
     steps: int
     guidance: float
 
 
 class Drawing(TypedDict):
-    """How motions are drawn, as `tasks.text.sample_features` takes it."""
+    """How motions are sampled, as `tasks.text.sample_features` takes it."""
 
     steps: int
     guidance: float
@@ -204,7 +204,7 @@ class Protocol:
         return {"steps": steps, "guidance": self.guidance, "solver": self.solver, "spacing": self.spacing}
 
     def seeds(self, replication: int, rows: int, *, after: int = 0) -> list[int]:
-        """One seed per motion of a replication; no two replications share one. ``after``: so many were drawn before."""
+        """One seed per motion of a replication; no two replications share one. ``after``: so many were used before."""
         if after + rows > STRIDE:
             raise ValueError(f"{after + rows} motions in one replication")
         first = self.seed + replication * STRIDE + after
@@ -212,7 +212,7 @@ class Protocol:
 
     def sampling(self) -> dict[str, Any]:
         """Everything that changes the motions of one replication or their numbers: what a resumed run must agree in."""
-        kept = (
+        names = (
             "lengths",
             "caption_length",
             "batch",
@@ -224,7 +224,7 @@ class Protocol:
             "count",
             "multimodal_replications",
         )
-        return {name: getattr(self, name) for name in kept}
+        return {name: getattr(self, name) for name in names}
 
     def described(self, selection: Selection, *, data: str, items: int, evaluator: str) -> dict[str, Any]:
         """Everything that a reader needs to judge the numbers, as plain data; no place on anybody's disk."""
@@ -279,9 +279,9 @@ VALUE = re.compile(r"\{([\w.]+)\}")
 
 
 def reported(table: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """What a report says of how it was measured: a table of ``protocols.toml`` with the values that its texts name."""
-    found: dict[str, Any] = {}
+    """How a report was measured: a table of ``protocols.toml`` with the values that its texts name."""
+    result: dict[str, Any] = {}
     for name, text in read_table("motionloom_lab.suites", "protocols.toml")[table].items():
         alone = VALUE.fullmatch(text)
-        found[name] = Formatter().get_field(alone[1], (), values)[0] if alone else text.format(**values)
-    return found
+        result[name] = Formatter().get_field(alone[1], (), values)[0] if alone else text.format(**values)
+    return result

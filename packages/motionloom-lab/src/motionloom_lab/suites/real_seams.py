@@ -1,7 +1,7 @@
-"""Stretches of real motion as long as a transition: what transitions are held against.
+"""Stretches of real motion as long as a transition: what transitions are compared with.
 
 ``transitions_reference.json`` beside this file holds their physical numbers for those who have no recordings; it is
-made by ``motionloom evaluate transitions --make-reference FILE --data SET``.
+written by ``motionloom evaluate transitions --make-reference FILE --data SET``.
 """
 
 import math
@@ -72,7 +72,7 @@ class SeamCrops:
         return SeamCrops(motions, window, embeddings, mean_jerk(chosen.positions))
 
     def again(self, count: int, *, seed: tuple[int, ...]) -> SeamWindows:
-        """``count`` windows of as many different motions, drawn anew."""
+        """``count`` windows of as many different motions, new ones each time."""
         rng = np.random.default_rng(seed)
         rows = rng.permutation(len(self.motions))[:count]
         return _windows([self.motions[k] for k in rows], self.window, rng)
@@ -96,8 +96,8 @@ def jerks(positions: np.ndarray, reference: float) -> dict[str, float]:
 
 def averaged(clips: Sequence[np.ndarray]) -> dict[str, float]:
     """`PHYSICAL` of clips (frames, 22, 3), weighted by length."""
-    found = physical_mean(clips)
-    return {short: found[name] for short, name in PHYSICAL.items()}
+    numbers = physical_mean(clips)
+    return {short: numbers[name] for short, name in PHYSICAL.items()}
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,11 @@ class Shipped:
 def measure_shipped(crops: SeamCrops, *, source: str, seed: int = 0) -> dict[str, Any]:
     """The content of the file: all crops once, and `REPEATS` draws of each of `COUNTS`."""
     every = crops.again(len(crops.motions), seed=(seed, 2))
-    found: dict[str, Any] = {}
+    by_count: dict[str, Any] = {}
     for count in COUNTS:
         if count <= len(crops.motions):
             draws = [jerks(crops.again(count, seed=(seed, 3, r)).positions, crops.mean_jerk) for r in range(REPEATS)]
-            found[str(count)] = {name: round(float(np.mean([draw[name] for draw in draws])), 6) for name in NAMES}
+            by_count[str(count)] = {name: round(float(np.mean([draw[name] for draw in draws])), 6) for name in NAMES}
     numbers = {**averaged(list(every.positions)), "step": 1000 * every.step}
     return {
         "format": FORMAT,
@@ -136,7 +136,7 @@ def measure_shipped(crops: SeamCrops, *, source: str, seed: int = 0) -> dict[str
         "windows": len(crops.motions),
         "mean_jerk": round(crops.mean_jerk, 9),
         "physical": {name: round(value, 6) for name, value in numbers.items()},
-        "jerks": found,
+        "jerks": by_count,
     }
 
 
@@ -151,14 +151,14 @@ def load_shipped(path: Path | None = None) -> Shipped | None:
     if not path.is_file():
         return None
     try:
-        found = plain_json(read_bytes(path, max_bytes=LARGEST_FILE))
-        if found["format"] != FORMAT:
+        data = plain_json(read_bytes(path, max_bytes=LARGEST_FILE))
+        if data["format"] != FORMAT:
             raise ValueError("it has another format")
-        seams = {name: _number(found["physical"][name]) for name in (*PHYSICAL, "step")}
+        seams = {name: _number(data["physical"][name]) for name in (*PHYSICAL, "step")}
         by_count = {
-            int(count): {name: _number(numbers[name]) for name in NAMES} for count, numbers in found["jerks"].items()
+            int(count): {name: _number(numbers[name]) for name in NAMES} for count, numbers in data["jerks"].items()
         }
-        return Shipped(int(found["window"]), _number(found["mean_jerk"]), seams, by_count)
+        return Shipped(int(data["window"]), _number(data["mean_jerk"]), seams, by_count)
     except DAMAGED as error:
         raise MotionloomError(f"{path} holds no numbers of real transitions ({error!r}); make it again") from None
 

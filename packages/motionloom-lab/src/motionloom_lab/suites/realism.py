@@ -51,28 +51,28 @@ def everyday(count: int) -> list[Order]:
 
 
 def run(
-    run: Run, wanted: Sequence[Order], *, generate: Generate | None = None, seed: int = 0
+    run: Run, batches: Sequence[Order], *, generate: Generate | None = None, seed: int = 0
 ) -> tuple[list[Array], float]:
     """Generate all orders from seeds ``seed`` on: motions (frames, 22, 3) in metres, and their frames per second.
 
-    generate: makes the motions; None: the run's weights with their usual settings.
+    generate: generates the motions; None: the run's weights with their usual settings.
     """
     generate = generate or generator(Prior.load(run.weights, device=run.device))
-    made: list[Array] = []
+    clips: list[Array] = []
     fps = float(FPS)
-    for order in wanted:
-        motions, fps = generate(order.prompts, seconds=order.seconds, seed=seed + len(made))
-        made += motions
-        run.progress(f"{len(made)} of {sum(len(o.prompts) for o in wanted)} motions")
-    return made, fps
+    for order in batches:
+        motions, fps = generate(order.prompts, seconds=order.seconds, seed=seed + len(clips))
+        clips += motions
+        run.progress(f"{len(clips)} of {sum(len(o.prompts) for o in batches)} motions")
+    return clips, fps
 
 
-def judge(made: Sequence[Array], fps: float, real: Sequence[Array] | dict[str, float]) -> dict[str, Any]:
+def judge(clips: Sequence[Array], fps: float, real: Sequence[Array] | dict[str, float]) -> dict[str, Any]:
     """Comparison as plain data; ``real`` is clips at 20 frames per second or finished averages."""
     finished = real if isinstance(real, dict) else average(list(real), FPS)
-    rows = compare(average(list(made), fps), finished)
-    found: dict[str, Any] = {
-        "generated_clips": len(made),
+    rows = compare(average(list(clips), fps), finished)
+    data: dict[str, Any] = {
+        "generated_clips": len(clips),
         "real_clips": None if isinstance(real, dict) else len(real),
         "numbers": {
             row.number.name: {
@@ -84,17 +84,17 @@ def judge(made: Sequence[Array], fps: float, real: Sequence[Array] | dict[str, f
             for row in rows
         },
     }
-    if not isinstance(real, dict) and fps == FPS and made and len(real):
-        found["speed_distance"] = round(speed_distance(list(made), list(real), FPS), 4)
-    found["passed"] = sum(row.passes for row in rows)
-    return found
+    if not isinstance(real, dict) and fps == FPS and clips and len(real):
+        data["speed_distance"] = round(speed_distance(list(clips), list(real), FPS), 4)
+    data["passed"] = sum(row.passes for row in rows)
+    return data
 
 
-def table(found: dict[str, Any]) -> list[list[str]]:
+def table(data: dict[str, Any]) -> list[list[str]]:
     """Rows of text for `judge`'s answer, the heading first."""
     rows = [["number", "generated", "real", "ratio", "", "what it is"]]
     for number in NUMBERS:
-        n = found["numbers"][number.name]
+        n = data["numbers"][number.name]
         ratio = "-" if n["ratio"] is None else f"{n['ratio']:.2f}"
         verdict = "ok" if n["passes"] else "FAIL"
         rows.append([number.name, f"{n['generated']:.3f}", f"{n['real']:.3f}", ratio, verdict, number.meaning])

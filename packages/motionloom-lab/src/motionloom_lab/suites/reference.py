@@ -1,7 +1,7 @@
 """Real people in numbers: how the checks judge real clips, and how real clips score in realism.
 
 `reference.json` beside this file holds the numbers for the mocap pack the project was built with (no motion, no text),
-so that tables can show them where no recordings are at hand. `motionloom evaluate reference` makes it anew.
+so that tables can show them where no recordings are at hand. `motionloom evaluate reference` writes it anew.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,18 +23,18 @@ def known() -> dict[str, Any]:
 
 def reference(clips: Iterable[RealClip], progress: Say = silent) -> dict[str, Any]:
     """All numbers for a set of real clips, as plain data."""
-    kept = list(clips)
-    progress(f"{len(kept)} real clips")
-    rows = [(clip, measure(clip.positions, FPS)) for clip in kept if clip.captions]
-    sources = sorted({clip.source for clip in kept})
+    every = list(clips)
+    progress(f"{len(every)} real clips")
+    rows = [(clip, measure(clip.positions, FPS)) for clip in every if clip.captions]
+    sources = sorted({clip.source for clip in every})
     return {
-        "clips": len(kept),
-        "held_out_clips": sum(clip.held_out for clip in kept),
+        "clips": len(every),
+        "held_out_clips": sum(clip.held_out for clip in every),
         "checks": {check.name: judged(check, rows) for check in CHECKS},
         "confusion": confusion(rows),
         "realism": {
-            "held_out": _rounded([c for c in kept if c.held_out]),
-            **{source: _rounded([c for c in kept if c.source == source]) for source in sources},
+            "held_out": _rounded([c for c in every if c.held_out]),
+            **{source: _rounded([c for c in every if c.source == source]) for source in sources},
         },
     }
 
@@ -65,21 +65,21 @@ def confusion(rows: Sequence[tuple[RealClip, Measures]]) -> dict[str, dict[str, 
     return table
 
 
-def rates(found: dict[str, Any]) -> list[list[str]]:
+def rates(data: dict[str, Any]) -> list[list[str]]:
     """Table of the passes, the heading first."""
     rows = [["check", "real held-out", "real all", "related", "other actions", "wrong"]]
-    for name, counts in found["checks"].items():
+    for name, counts in data["checks"].items():
         passed, tried = map(int, counts["others"].split("/"))
         wrong = f"{100 * passed / max(1, tried):.1f} %"
         rows.append([name, counts["held_out"], counts["all"], counts["related"], counts["others"], wrong])
     return rows
 
 
-def confusion_table(found: dict[str, Any]) -> list[list[str]]:
+def confusion_table(data: dict[str, Any]) -> list[list[str]]:
     """Table of per cent, an action a row and a check a column, columns by the number of their check."""
     numbers = {check.name: str(k) for k, check in enumerate(CHECKS, start=1)}
     rows = [["real clips of", *numbers.values()]]
-    for action, shares in found["confusion"].items():
+    for action, shares in data["confusion"].items():
         cells = [f"{100 * shares[c.name]:.0f}" if shares[c.name] else "." for c in CHECKS]
         rows.append([f"{numbers[action]} {action}", *cells])
     return rows

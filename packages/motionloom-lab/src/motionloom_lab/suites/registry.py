@@ -18,7 +18,7 @@ from motionloom_lab.suites.harness import Generate, Run, evaluator_file
 from motionloom_train.data.progress import Say, silent
 
 HERE = Path(__file__).parent
-Asked = Mapping[str, Any]
+Options = Mapping[str, Any]
 """Options that were given, by name; those of a suite are in ``options.toml``."""
 
 
@@ -27,7 +27,7 @@ class Tools:
     """What a suite cannot make itself: the command line hands it in, a test hands in fakes."""
 
     generator: Callable[[bool], Generate]
-    """Motions of the weights under test, as drawn (False) or as exported (True)."""
+    """Motions of the weights under test, as sampled (False) or as exported (True)."""
     prior: Callable[[], Prior]
     """The weights under test, loaded once."""
     speed: Callable[[bool], Mapping[str, Any]]
@@ -49,7 +49,7 @@ class Job:
     quick: bool = False
     device: str = "cpu"
     folder: Path | None = None
-    """Where a suite may keep what it has done so far; made by whoever writes there."""
+    """Where a suite may keep its results so far; created on the first write."""
     command: str = ""
     """What was typed; empty for a suite of `motionloom evaluate all`."""
 
@@ -72,11 +72,11 @@ class Suite:
 
     name: str
     measures: str
-    run: Callable[[Job, Asked], Report]
+    run: Callable[[Job, Options], Report]
     """Called with the job and the options of its kind of run; resumes from what is in ``job.folder``."""
-    full: Asked
+    full: Options
     """Options of a run whose numbers are kept."""
-    quick: Asked
+    quick: Options
     """Options of a run that only shows that everything works."""
     data: Literal["needed", "used", ""] = ""
     """Whether it cannot do without a set, compares with one where there is one, or reads none."""
@@ -94,7 +94,7 @@ class Suite:
         files = [path for path in self.files(job) if path.suffix == ".safetensors" and path.parent != HERE]
         return [*([find_weights(job.weights)] if self.prior else []), *files]
 
-    def settings(self, quick: bool) -> Asked:
+    def settings(self, quick: bool) -> Options:
         """The options of a quick or of a full run."""
         return self.quick if quick else self.full
 
@@ -111,7 +111,7 @@ def command(name: str, job: Job) -> str:
 def _files(kinds: Sequence[str]) -> Callable[[Job], Sequence[Path]]:
     """The files of some kinds, as far as they are there."""
 
-    def found(job: Job) -> list[Path]:
+    def find(job: Job) -> list[Path]:
         from motionloom.weights.adapter import adapters
         from motionloom.weights.pair import blocks
         from motionloom.weights.predictor import shipped_predictors
@@ -126,10 +126,10 @@ def _files(kinds: Sequence[str]) -> Callable[[Job], Sequence[Path]]:
         }
         return [path for kind in kinds for path in every[kind]() if path and path.is_file()]
 
-    return found
+    return find
 
 
-def _suite(name: str, row: Asked) -> Suite:
+def _suite(name: str, row: Options) -> Suite:
     files, kind = row.get("files", ()), row.get("needs")
     return Suite(
         name,

@@ -1,6 +1,6 @@
 """The text-to-motion suite: does a motion go with its words, does it look like real ones, what does it cost.
 
-Generation comes in as a function, so that a made-up one can be tested and any prior measured. Every replication of
+Generation comes in as a function, so that an artificial one can be tested and any prior measured. Every replication of
 every row is kept in a small file as it is done; a run that was stopped goes on with the next one.
 """
 
@@ -69,11 +69,11 @@ class TextTrial:
     protocol: Protocol
     texts: tuple[Array, ...]
     """For each item (captions, width): its captions as they are."""
-    read: tuple[Array, ...]
+    inputs: tuple[Array, ...]
     """The same as they are read beside generated motions, see `Protocol.caption_length`."""
 
     def shuffle(self, replication: int) -> tuple[list[int], np.ndarray, np.random.Generator]:
-        """For one replication: a caption for each item, the order of the items, and what is drawn after that."""
+        """For one replication: a caption for each item, the order of the items, and the generator for what follows."""
         rng = np.random.default_rng((self.protocol.seed, replication))
         chosen = pick(self.real.captions, rng)
         return chosen, rng.permutation(len(chosen)), rng
@@ -84,15 +84,15 @@ class TextTrial:
 
 
 def prepare(draw: Draw, evaluator: Evaluator, real: TextReference, protocol: Protocol) -> TextTrial:
-    """Choose the items and embed their captions; MotionloomError where that cannot be done as asked."""
+    """Choose the items and embed their captions; MotionloomError where that cannot be done."""
     chosen = real.chosen(protocol)
     flat = [caption for several in chosen.captions for caption in several]
     cuts = np.cumsum([len(several) for several in chosen.captions])[:-1]
     texts = tuple(np.split(evaluator.texts(flat), cuts))
-    read = texts
+    inputs = texts
     if protocol.caption_length == "published":
-        read = tuple(np.split(_as_published(evaluator, flat), cuts))
-    return TextTrial(draw, evaluator, chosen, protocol, texts, read)
+        inputs = tuple(np.split(_as_published(evaluator, flat), cuts))
+    return TextTrial(draw, evaluator, chosen, protocol, texts, inputs)
 
 
 def _as_published(evaluator: Evaluator, captions: Sequence[Caption]) -> Array:
@@ -107,7 +107,7 @@ def _as_published(evaluator: Evaluator, captions: Sequence[Caption]) -> Array:
 # ---- the numbers of one replication ----------------------------------------------------------------------------------
 
 
-def matched(trial: TextTrial, texts: Array, motions: Array, said: Sequence[str]) -> dict[str, float]:
+def matched(trial: TextTrial, texts: Array, motions: Array, words: Sequence[str]) -> dict[str, float]:
     """How well (items, width) texts and motions in one order go together."""
     batch = trial.protocol.batch
     r1, r2, r3 = r_precision(texts, motions, top=3, batch=batch)
@@ -115,23 +115,23 @@ def matched(trial: TextTrial, texts: Array, motions: Array, said: Sequence[str])
         "r1": float(r1),
         "r2": float(r2),
         "r3": float(r3),
-        "r3_same": same_words_precision(texts, motions, said, top=3, batch=batch),
+        "r3_same": same_words_precision(texts, motions, words, top=3, batch=batch),
         "mm_dist": matching_distance(texts, motions, batch=batch),
     }
 
 
-def same_words_precision(texts: Array, motions: Array, said: Sequence[str], *, top: int, batch: int | None) -> float:
+def same_words_precision(texts: Array, motions: Array, words: Sequence[str], *, top: int, batch: int | None) -> float:
     """Share of texts with a motion of a caption of the same words among the ``top`` nearest of its batch.
 
     Batches as in `r_precision`. A motion of other words exactly as near goes before: equal embeddings are no hits.
     """
-    words = np.array([plain_words(text) for text in said])
+    plain = np.array([plain_words(text) for text in words])
     size = batch or len(texts)
     hits = []
     for row in range(len(texts) // size * size):
         part = slice(row // size * size, row // size * size + size)
         distance = np.linalg.norm(motions[part] - texts[row], axis=1)  # a row at a time: the set may be one batch
-        same = words[part] == words[row]
+        same = plain[part] == plain[row]
         hits.append((~same & (distance <= distance[same].min())).sum() < top)
     return float(np.mean(hits))
 
@@ -140,60 +140,65 @@ def of_real(trial: TextTrial, replication: int, *, shuffled: bool = False) -> di
     """Real motions with their captions, or with anybody's: the captions then are dealt out anew over all items."""
     chosen, order, rng = trial.shuffle(replication)
     texts = np.stack([several[k] for several, k in zip(trial.texts, chosen, strict=True)])
-    motions, said = trial.real.motions, trial.sentences(chosen)
+    motions, words = trial.real.motions, trial.sentences(chosen)
     if shuffled:
         dealt = rng.permutation(len(texts))
-        return matched(trial, texts[dealt][order], motions[order], [said[k] for k in dealt[order]])
-    found = matched(trial, texts[order], motions[order], [said[k] for k in order])
+        return matched(trial, texts[dealt][order], motions[order], [words[k] for k in dealt[order]])
+    numbers = matched(trial, texts[order], motions[order], [words[k] for k in order])
     physical = averaged(trial.real.physical, trial.real.frames)
-    return {**found, "fid": fid(motions, trial.real.motions), "diversity": diversity(motions, replication), **physical}
+    return {
+        **numbers,
+        "fid": fid(motions, trial.real.motions),
+        "diversity": diversity(motions, replication),
+        **physical,
+    }
 
 
 def of_generated(trial: TextTrial, replication: int, steps: int) -> dict[str, float]:
     """One motion per item, measured; the time goes to sampling alone."""
     chosen, order, _ = trial.shuffle(replication)
-    said, frames = trial.sentences(chosen), trial.real.frames
+    prompts, frames = trial.sentences(chosen), trial.real.frames
     start = time.perf_counter()
-    drawn = _sampled(trial, said, frames, seeds=trial.protocol.seeds(replication, len(said)), steps=steps)
+    features = _sampled(trial, prompts, frames, seeds=trial.protocol.seeds(replication, len(prompts)), steps=steps)
     seconds = time.perf_counter() - start
-    motions = embedded(trial.evaluator, drawn)
-    texts = np.stack([several[k] for several, k in zip(trial.read, chosen, strict=True)])
-    found = matched(trial, texts[order], motions[order], [said[k] for k in order])
-    found["fid"], found["diversity"] = fid(motions, trial.real.motions), diversity(motions, replication)
-    found |= averaged([list(text_reference.of_features(one).values()) for one in drawn], frames)
-    found |= {"ms": 1000 * seconds / len(said), "per_second": len(said) / max(seconds, 1e-9)}
+    motions = embedded(trial.evaluator, features)
+    texts = np.stack([several[k] for several, k in zip(trial.inputs, chosen, strict=True)])
+    numbers = matched(trial, texts[order], motions[order], [prompts[k] for k in order])
+    numbers["fid"], numbers["diversity"] = fid(motions, trial.real.motions), diversity(motions, replication)
+    numbers |= averaged([list(text_reference.of_features(one).values()) for one in features], frames)
+    numbers |= {"ms": 1000 * seconds / len(prompts), "per_second": len(prompts) / max(seconds, 1e-9)}
     captions, samples = trial.protocol.multimodality
     if captions and replication < trial.protocol.multimodal_replications:
-        found["multimodality"] = _several(trial, replication, steps, captions=captions, samples=samples)
-    return found
+        numbers["multimodality"] = _several(trial, replication, steps, captions=captions, samples=samples)
+    return numbers
 
 
 def _sampled(
-    trial: TextTrial, said: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
+    trial: TextTrial, prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
 ) -> list[np.ndarray]:
     """Motions of the wanted lengths, cut to them where they are generated longer."""
     padded = trial.protocol.lengths == "padded"
-    asked = [trial.real.selection.longest] * len(said) if padded else list(frames)
-    drawn = trial.draw(said, asked, seeds=seeds, steps=steps)
-    if [len(features) for features in drawn] != asked:
+    lengths = [trial.real.selection.longest] * len(prompts) if padded else list(frames)
+    motions = trial.draw(prompts, lengths, seeds=seeds, steps=steps)
+    if [len(features) for features in motions] != lengths:
         raise ValueError("the generator gave other lengths than asked for")
-    return [features[:length] for features, length in zip(drawn, frames, strict=True)]
+    return [features[:length] for features, length in zip(motions, frames, strict=True)]
 
 
 def _several(trial: TextTrial, replication: int, steps: int, *, captions: int, samples: int) -> float:
     """MultiModality of different motions of one caption: unlike the published draw, none is paired with itself."""
     chosen, order, rng = trial.shuffle(replication)
     items = order[:captions]
-    said, frames = trial.sentences(chosen), trial.real.frames
-    seeds = trial.protocol.seeds(replication, len(items) * samples, after=len(said))
-    drawn = _sampled(
+    prompts, frames = trial.sentences(chosen), trial.real.frames
+    seeds = trial.protocol.seeds(replication, len(items) * samples, after=len(prompts))
+    features = _sampled(
         trial,
-        [said[k] for k in items for _ in range(samples)],
+        [prompts[k] for k in items for _ in range(samples)],
         [frames[k] for k in items for _ in range(samples)],
         seeds=seeds,
         steps=steps,
     )
-    motions = embedded(trial.evaluator, drawn).reshape(len(items), samples, -1)
+    motions = embedded(trial.evaluator, features).reshape(len(items), samples, -1)
     pairs = min(MULTIMODAL_PAIRS, samples // 2)
     mixed = rng.permutation(samples)
     return multimodality_of(motions, mixed[:pairs], mixed[pairs : 2 * pairs])
@@ -227,7 +232,7 @@ def measure(
         row_of(CHANCE, [of_chance(trial)], COLUMNS),
     ]
     for steps in protocol.steps:
-        found = replicated(
+        results = replicated(
             f"{steps} steps",
             len(count),
             lambda r, steps=steps: of_generated(trial, r, steps),
@@ -235,7 +240,7 @@ def measure(
             lambda n: f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion",
             run.progress,
         )
-        values = dict(row_of("", found, COLUMNS).values)
+        values = dict(row_of("", results, COLUMNS).values)
         if memory is not None:
             peak = parts.once(f"{steps} steps memory", lambda steps=steps: {"memory": memory(steps)})
             values["memory"] = Value(peak["memory"])
@@ -249,12 +254,12 @@ def _notes(trial: TextTrial) -> tuple[str, ...]:
     real = trial.real
     count, half = len(real.motions), len(real.motions) // 2
     bias = fid_bias(real.motions, half, repeats=10, seed=trial.protocol.seed)
-    said = [plain_words(caption.text) for several in real.captions for caption in several]
-    numbers = {"captions": len(said), "repeated": len(said) - len(set(said)), "width": real.motions.shape[1]}
-    found = notes("text", dict(count=count, half=half, bias=bias, **numbers))
+    words = [plain_words(caption.text) for several in real.captions for caption in several]
+    numbers = {"captions": len(words), "repeated": len(words) - len(set(words)), "width": real.motions.shape[1]}
+    lines = notes("text", dict(count=count, half=half, bias=bias, **numbers))
     about = "; ".join(f"{name}: {text}" for name, text in trial.evaluator.about.items())
     judge = (f"Evaluator {trial.evaluator.name}. {about}",) if about else ()
-    return (*found, *judge, *notes("cost"))
+    return (*lines, *judge, *notes("cost"))
 
 
 def run(
@@ -295,13 +300,13 @@ def drawer(prior: Prior, protocol: Protocol) -> Draw:
     readable(prior, max(protocol.steps))
 
     def draw(prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int) -> list[np.ndarray]:
-        drawn = sample_features(prior, prompts, frames, seeds=seeds, **protocol.drawing(steps))
-        return [features.astype(np.float64) for features in drawn]
+        motions = sample_features(prior, prompts, frames, seeds=seeds, **protocol.drawing(steps))
+        return [features.astype(np.float64) for features in motions]
 
     return draw
 
 
 def identity(real: TextReference) -> str:
     """Changes with the items; not with the embeddings, whose last digits depend on the number of threads."""
-    said = json.dumps([real.names, [[c.text for c in several] for several in real.captions], real.frames])
-    return hashlib.sha256(said.encode() + real.physical.astype(np.float32).tobytes()).hexdigest()[:16]
+    text = json.dumps([real.names, [[c.text for c in several] for several in real.captions], real.frames])
+    return hashlib.sha256(text.encode() + real.physical.astype(np.float32).tobytes()).hexdigest()[:16]

@@ -1,6 +1,6 @@
 """Real motions as one evaluator sees them: enough to measure generated ones where no recording is at hand.
 
-`text_reference.safetensors` beside this file is made by ``motionloom evaluate text --make-reference FILE --data SET``:
+`text_reference.safetensors` beside this file is of ``motionloom evaluate text --make-reference FILE --data SET``:
 embeddings (no motion), captions, lengths and physical numbers of held-out recordings.
 """
 
@@ -40,7 +40,7 @@ SENTENCE = Caption("a person walks forward.", ("a/DET", "person/NOUN", "walk/VER
 
 @dataclass(frozen=True, eq=False)
 class TextReference:
-    """Real items: what people say of them, how long they are, where the evaluator puts them."""
+    """Real items: their captions, lengths and points in the evaluator's space."""
 
     names: tuple[str, ...]
     captions: tuple[tuple[Caption, ...], ...]
@@ -52,7 +52,7 @@ class TextReference:
     selection: Selection
     evaluator: str
     probe: Array
-    """(2, width): what the evaluator says of a made-up caption and a made-up motion, by which it is known again."""
+    """(2, width): an artificial caption and motion as the evaluator sees them, by which it is recognised."""
 
     def chosen(self, protocol: Protocol) -> "TextReference":
         """As many items as the protocol counts, spread evenly; MotionloomError where they do not fill a batch."""
@@ -102,7 +102,7 @@ def measure(items: Sequence[Item], evaluator: Evaluator, selection: Selection, p
 
 
 def of_features(features: np.ndarray) -> dict[str, float]:
-    """`harness.physical` of a motion (frames, 263), not standardised, as the network draws it."""
+    """`harness.physical` of a motion (frames, 263), not standardised, as the network samples it."""
     return physical(humanml.decode_positions(np.asarray(features, dtype=np.float64)))
 
 
@@ -114,10 +114,10 @@ def probe(evaluator: Evaluator) -> Array:
 
 
 def made_by(reference: TextReference, evaluator: Evaluator) -> bool:
-    """Is this the evaluator that the reference was made with? Up to rounding, which differs between machines."""
-    found = probe(evaluator)
-    return found.shape == reference.probe.shape and bool(
-        np.abs(found - reference.probe).max() <= 1e-3 * max(1e-6, float(np.abs(reference.probe).max()))
+    """Is this the evaluator of the reference? Up to rounding, which differs between machines."""
+    own = probe(evaluator)
+    return own.shape == reference.probe.shape and bool(
+        np.abs(own - reference.probe).max() <= 1e-3 * max(1e-6, float(np.abs(reference.probe).max()))
     )
 
 
@@ -163,7 +163,7 @@ def load_shipped(evaluator: Evaluator, selection: Selection | None) -> TextRefer
 
 
 def load(path: Path | str, evaluator: Evaluator) -> TextReference:
-    """The inverse of `save`, every shape and number checked; MotionloomError where another evaluator made it."""
+    """The inverse of `save`, every shape and number checked; MotionloomError where it is of another evaluator."""
     path = Path(path)
     if not path.is_file():
         raise MotionloomError(f"there is no reference {path}; name real motions with --data")
@@ -173,8 +173,8 @@ def load(path: Path | str, evaluator: Evaluator) -> TextReference:
             about = plain_json((file.metadata() or {})["reference"])
             if set(file.keys()) != set(_KINDS):
                 raise ValueError("its tensors have other names")
-            found = {name: file.get_tensor(name) for name in _KINDS}
-        reference = _decoded(about, found)
+            arrays = {name: file.get_tensor(name) for name in _KINDS}
+        reference = _decoded(about, arrays)
     except DAMAGED as error:
         reason = " ".join(str(error).split())[:160]
         raise MotionloomError(f"{path} is not a reference of real motions ({reason}); make it again") from None
@@ -186,39 +186,41 @@ def load(path: Path | str, evaluator: Evaluator) -> TextReference:
     return reference
 
 
-def _decoded(about: dict[str, Any], found: dict[str, np.ndarray]) -> TextReference:
+def _decoded(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> TextReference:
     if about["format"] != FORMAT or tuple(about["physical"]) != PHYSICAL:
         raise ValueError("it has another format")
     for name, kind in _KINDS.items():
-        if found[name].dtype != kind or not np.isfinite(found[name]).all():
+        if arrays[name].dtype != kind or not np.isfinite(arrays[name]).all():
             raise ValueError(f"{name} holds other numbers than finite {np.dtype(kind).name}")
     names = tuple(map(_short_text, about["names"]))
-    count, width = len(names), found["probe"].shape[-1]
+    count, width = len(names), arrays["probe"].shape[-1]
     shapes = {"motions": (count, width), "frames": (count,), "physical": (count, len(PHYSICAL)), "probe": (2, width)}
-    if not 1 <= count <= MOST_ITEMS or any(found[name].shape != shape for name, shape in shapes.items()):
+    if not 1 <= count <= MOST_ITEMS or any(arrays[name].shape != shape for name, shape in shapes.items()):
         raise ValueError("its arrays do not fit one another")
     captions = tuple(tuple(_caption(c) for c in several) for several in about["captions"])
     if len(captions) != count or not all(captions):
         raise ValueError("its captions do not fit its items")
     selection = _selection(about["selection"])
-    frames = tuple(int(n) for n in found["frames"])
+    frames = tuple(int(n) for n in arrays["frames"])
     if not all(selection.shortest <= n <= selection.longest for n in frames):
         raise ValueError("it has lengths that were not selected")
-    motions, physicals, seen = (found[name].astype(np.float64) for name in ("motions", "physical", "probe"))
-    return TextReference(names, captions, frames, motions, physicals, selection, _short_text(about["evaluator"]), seen)
+    motions, physicals, probes = (arrays[name].astype(np.float64) for name in ("motions", "physical", "probe"))
+    return TextReference(
+        names, captions, frames, motions, physicals, selection, _short_text(about["evaluator"]), probes
+    )
 
 
-def _selection(found: dict[str, Any]) -> Selection:
-    numbers = [found[name] for name in ("shortest", "longest", "unit")]
-    flags = [found[name] for name in ("mirrored", "shorter_third")]
+def _selection(data: dict[str, Any]) -> Selection:
+    numbers = [data[name] for name in ("shortest", "longest", "unit")]
+    flags = [data[name] for name in ("mirrored", "shorter_third")]
     if not all(type(n) is int for n in numbers) or not all(isinstance(flag, bool) for flag in flags):
         raise ValueError("its selection says what cannot be")
-    splits, sources = (tuple(map(_short_text, found[name])) for name in ("splits", "sources"))
+    splits, sources = (tuple(map(_short_text, data[name])) for name in ("splits", "sources"))
     return Selection(splits, sources, flags[0], numbers[0], numbers[1], numbers[2], flags[1])
 
 
-def _caption(found: Any) -> Caption:
-    text, tokens = found
+def _caption(data: Any) -> Caption:
+    text, tokens = data
     if not _short_text(text).strip():
         raise ValueError("a caption is empty")
     return Caption(text, tuple(map(_short_text, tokens)))

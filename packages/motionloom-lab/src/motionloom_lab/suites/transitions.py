@@ -62,9 +62,9 @@ class SeamTrial:
         for unfolding in range(self.how.unfoldings):
             items = order[unfolding * self.how.intervals : (unfolding + 1) * self.how.intervals].tolist()
             several = [self.real.captions[k] for k in items]
-            said = [captions[int(rng.integers(len(captions)))] for captions in several]
+            picks = [captions[int(rng.integers(len(captions)))] for captions in several]
             frames = [min(max(self.real.frames[k], self.how.shortest), self.how.longest) for k in items]
-            yield items, said, frames
+            yield items, picks, frames
 
 
 def prepare(
@@ -111,51 +111,51 @@ def windows(frames: Sequence[int], size: int) -> list[slice]:
 def of_method(trial: SeamTrial, method: Method, replication: int) -> dict[str, float]:
     """All columns for one way; the time goes to making the motions alone."""
     how = trial.how
-    middles, seams, said, around, inside, steps = [], [], [], [], [], []
+    middles, seams, texts, around, inside, steps = [], [], [], [], [], []
     spent = total = 0.0
     for unfolding, (_, captions, frames) in enumerate(trial.requests(replication)):
         start = time.perf_counter()
-        made = method([caption.text for caption in captions], frames, how.first_seed(replication, unfolding))
+        motion = method([caption.text for caption in captions], frames, how.first_seed(replication, unfolding))
         spent, total = spent + time.perf_counter() - start, total + sum(frames) / FPS
-        _check(made, sum(frames))
-        said += captions
-        middles += [made.features[part] for part in cut(frames, how.handshake // 2)]
+        _check(motion, sum(frames))
+        texts += captions
+        middles += [motion.features[part] for part in cut(frames, how.handshake // 2)]
         parts = windows(frames, how.window)
-        seams += [made.features[part] for part in parts]
-        around += [made.positions[part] for part in parts]
-        inside += [made.positions[p] for p in cut(frames, how.window // 2) if p.stop - p.start >= LEAST_INSIDE]
-        steps += transition_distance(made.positions, np.cumsum(frames)[:-1].tolist()).tolist()
-    found = _matched(trial, said, embedded(trial.evaluator, middles), replication)
-    found |= _around(trial, seams, np.stack(around), replication)
-    found |= {"step": 1000 * float(np.mean(steps)), "cost": spent / total}
+        seams += [motion.features[part] for part in parts]
+        around += [motion.positions[part] for part in parts]
+        inside += [motion.positions[p] for p in cut(frames, how.window // 2) if p.stop - p.start >= LEAST_INSIDE]
+        steps += transition_distance(motion.positions, np.cumsum(frames)[:-1].tolist()).tolist()
+    result = _matched(trial, texts, embedded(trial.evaluator, middles), replication)
+    result |= _around(trial, seams, np.stack(around), replication)
+    result |= {"step": 1000 * float(np.mean(steps)), "cost": spent / total}
     if inside:
-        found |= {f"inside_{name}": value for name, value in averaged(inside).items()}
+        result |= {f"inside_{name}": value for name, value in averaged(inside).items()}
         own = np.concatenate([sequence_jerk(part[None])[0] for part in inside]).mean()
-        found["auj_own"] = area_under_jerk(jerk_curve(np.stack(around)), float(own))
-    return found
+        result["auj_own"] = area_under_jerk(jerk_curve(np.stack(around)), float(own))
+    return result
 
 
 def of_real(trial: SeamTrial, replication: int) -> dict[str, float]:
     """Real motions with their own captions; other random windows of real motion in place of transitions."""
     rows = [item for items, _, _ in trial.requests(replication) for item in items]
-    said = [caption for _, captions, _ in trial.requests(replication) for caption in captions]
-    found = _matched(trial, said, trial.real.motions[rows], replication)
+    several = [caption for _, captions, _ in trial.requests(replication) for caption in captions]
+    result = _matched(trial, several, trial.real.motions[rows], replication)
     numbers = harness.averaged(trial.real.physical, trial.real.frames)
-    found |= {f"inside_{short}": numbers[name] for short, name in PHYSICAL.items()}
+    result |= {f"inside_{short}": numbers[name] for short, name in PHYSICAL.items()}
     if trial.crops is not None:
         other = trial.crops.again(trial.how.seams, seed=(trial.how.seed, replication, 1))
-        found |= _around(trial, other.features, other.positions, replication)
-        found["step"] = 1000 * other.step
+        result |= _around(trial, other.features, other.positions, replication)
+        result["step"] = 1000 * other.step
     elif trial.shipped is not None:
-        found |= trial.shipped.row(trial.how)
-    if "auj" in found:
-        found["auj_own"] = found["auj"]  # real windows are windows like any other
-    return found
+        result |= trial.shipped.row(trial.how)
+    if "auj" in result:
+        result["auj_own"] = result["auj"]  # real windows are windows like any other
+    return result
 
 
-def _matched(trial: SeamTrial, said: Sequence[Caption], motions: Array, replication: int) -> dict[str, float]:
-    """Segments (segments, width), whatever is said of them."""
-    texts = trial.evaluator.texts(said)
+def _matched(trial: SeamTrial, captions: Sequence[Caption], motions: Array, replication: int) -> dict[str, float]:
+    """Segments (segments, width) beside their captions."""
+    texts = trial.evaluator.texts(captions)
     return {
         "r3": float(r_precision(texts, motions, top=3, batch=trial.how.intervals)[2]),
         "mm_dist": matching_distance(texts, motions, batch=trial.how.intervals),
@@ -168,21 +168,21 @@ def _around(
     trial: SeamTrial, features: Sequence[np.ndarray], positions: np.ndarray, replication: int
 ) -> dict[str, float]:
     """Numbers of windows: features of each, and positions (windows, frames, 22, 3)."""
-    found = {
+    result = {
         **jerks(positions, trial.mean_jerk),
         **{f"seam_{name}": value for name, value in averaged(list(positions)).items()},
     }
     if trial.crops is not None:
         embeddings = embedded(trial.evaluator, features)
-        found["transition_fid"] = fid(embeddings, trial.crops.embeddings)
-        found["transition_diversity"] = diversity(embeddings, replication)
-    return found
+        result["transition_fid"] = fid(embeddings, trial.crops.embeddings)
+        result["transition_diversity"] = diversity(embeddings, replication)
+    return result
 
 
-def _check(made: Long, frames: int) -> None:
-    if made.features.shape != (frames, WIDTH) or made.positions.shape != (frames, 22, 3):
-        raise ValueError(f"a method gave {made.features.shape} and {made.positions.shape} for {frames} frames")
-    if not (np.isfinite(made.features).all() and np.isfinite(made.positions).all()):
+def _check(motion: Long, frames: int) -> None:
+    if motion.features.shape != (frames, WIDTH) or motion.positions.shape != (frames, 22, 3):
+        raise ValueError(f"a method gave {motion.features.shape} and {motion.positions.shape} for {frames} frames")
+    if not (np.isfinite(motion.features).all() and np.isfinite(motion.positions).all()):
         raise MotionloomError("a method drew numbers that are not finite; these weights cannot be measured so")
 
 
@@ -198,7 +198,7 @@ def measure(
     looked_up = [name for name in real[0] if len({numbers.get(name) for numbers in real}) == 1]
     rows = [row_of(REAL, real, COLUMNS, looked_up)]
     for name, method in ways.items():
-        found = replicated(
+        results = replicated(
             name,
             how.replications,
             lambda r, method=method: of_method(trial, method, r),
@@ -206,8 +206,8 @@ def measure(
             lambda n: f"AUJ {n['auj']:.3f}, peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second",
             run.progress,
         )
-        rows.append(row_of(titled(name, how.steps), found, COLUMNS))
-    said = {
+        rows.append(row_of(titled(name, how.steps), results, COLUMNS))
+    about = {
         "data": trial.real.data,
         **trial.real.selection.described(),
         "items": len(trial.real.names),
@@ -216,7 +216,7 @@ def measure(
         **how.described(),
     }
     title = f"Long motion and its transitions: {run.label}"
-    return run.report("transitions", title, said, rows, _notes(trial), beside="long")
+    return run.report("transitions", title, about, rows, _notes(trial), beside="long")
 
 
 def _notes(trial: SeamTrial) -> tuple[str, ...]:
@@ -225,8 +225,8 @@ def _notes(trial: SeamTrial) -> tuple[str, ...]:
     some = min(half, segments)
     bias = fid_bias(trial.real.motions, some, other=half, repeats=10, seed=how.seed)
     jerk = {"frames": how.window - 3, "jerk": trial.mean_jerk, "published": JERK_HUMANML3D}
-    found = notes("transitions", dict(how=how, segments=segments, some=some, half=half, bias=bias, **jerk))
-    return (*found, *(notes("transitions-without-data") if trial.crops is None else ()), *notes("time"))
+    lines = notes("transitions", dict(how=how, segments=segments, some=some, half=half, bias=bias, **jerk))
+    return (*lines, *(notes("transitions-without-data") if trial.crops is None else ()), *notes("time"))
 
 
 def run(

@@ -1,9 +1,9 @@
 """The everyday checks tried on real people: clips that show the action should pass, all others should fail.
 
 Which clips show what is found by their names and captions (``trial_clips.toml``). A few actions were never
-recorded on their own; for those, examples are made of real clips: a part of a clip, one played backwards, or two
+recorded on their own; for those, examples are derived from real clips: a part of a clip, one played backwards, or two
 joined. Clips that show something so close that either answer is right count neither way. Simple deceivers are tried
-beside them: somebody who stands there and somebody who walks ahead.
+beside them: somebody who stands and somebody who walks ahead.
 """
 
 import re
@@ -26,9 +26,9 @@ from motionloom_train.data.progress import Say, silent
 
 NOTHING = r"(?!)"
 LONGEST = round(10 * FPS)
-"""Frames of a clip of another action that are judged: as long as the longest motion that is drawn at once."""
+"""Frames of a clip of another action that are judged: as long as the longest motion that is generated at once."""
 JOINS = 12
-"""Joined examples made for one check at the most."""
+"""Joined examples of one check at the most."""
 CAUGHT, WRONG = 0.6, 0.05
 """A sound check passes this share of its examples or more, and this share of other clips or less."""
 STANDING, WALKING = r"^(acf_stand|accad_male\d_a1_stand)@", r"^35_\d+@"
@@ -63,13 +63,13 @@ class CheckTally:
     shown: tuple[int, int] = (0, 0)
     """Real clips that show the action; of a sided action also mirrored ones of the other side."""
     made: tuple[int, int] = (0, 0)
-    """Examples made of real clips: backwards or joined."""
+    """Examples derived from real clips: backwards or joined."""
     opposite: tuple[int, int] = (0, 0)
     """Clips of a sided action, done on the other side."""
     others: tuple[int, int] = (0, 0)
     """Clips of other actions."""
     stands: bool = False
-    """Somebody who stands there passes."""
+    """Somebody who stands passes."""
     walks: bool = False
     """Somebody who walks ahead passes."""
     missed: list[str] = field(default_factory=list)
@@ -95,12 +95,12 @@ class CheckTally:
         nobody who stands or walks; a check without any example, or without other clips that fail, is none.
         """
         passed, tried = (a + b for a, b in zip(self.shown, self.made, strict=True))
-        said = ["no example"] if not tried else []
-        said += [f"misses {tried - passed} of {tried} examples"] if tried and self.caught < CAUGHT else []
-        said += ["nothing to fail on"] if self.others[0] == self.others[1] else []
-        said += [f"{self.wrong:.1%} of other clips pass"] if self.wrong > WRONG else []
-        said += [f"{self.opposite[0]} of the other side pass"] if self.opposite[0] else []
-        return [*said, *(["standing passes"] if self.stands else []), *(["walking passes"] if self.walks else [])]
+        why = ["no example"] if not tried else []
+        why += [f"misses {tried - passed} of {tried} examples"] if tried and self.caught < CAUGHT else []
+        why += ["nothing to fail on"] if self.others[0] == self.others[1] else []
+        why += [f"{self.wrong:.1%} of other clips pass"] if self.wrong > WRONG else []
+        why += [f"{self.opposite[0]} of the other side pass"] if self.opposite[0] else []
+        return [*why, *(["standing passes"] if self.stands else []), *(["walking passes"] if self.walks else [])]
 
 
 def text_of(clip: RealClip) -> str:
@@ -128,7 +128,7 @@ def on_the_floor(positions: Array) -> Array:
 
 
 def joined(parts: Sequence[Array], *, blend: int = 6) -> Array:
-    """Clips one after the other, each put where the last one ends and faces, the poses between blended over frames."""
+    """Clips one after the other, each from where the last one ends and faces, the poses between blended over frames."""
     whole = np.asarray(parts[0], dtype=np.float64)
     for part in parts[1:]:
         turn = float(ph.heading(whole)[-1] - ph.heading(part)[0])
@@ -192,13 +192,13 @@ def others(trial: Examples, clips: Iterable[RealClip]) -> Iterator[RealClip]:
 def standing_and_walking(clips: Sequence[RealClip], seconds: float) -> tuple[Array | None, Array | None]:
     """Two deceivers out of real clips: the first frame of somebody who stands, held; a walk ahead of middling pace."""
     frames = round(seconds * FPS)
-    stands = next((c for c in clips if re.search(STANDING, text_of(c))), None)
+    still = next((c for c in clips if re.search(STANDING, text_of(c))), None)
     walkers = sorted(
         (c for c in clips if re.search(WALKING, text_of(c))), key=lambda c: ph.speed(c.positions, FPS).mean()
     )
     walks = walkers[len(walkers) // 2] if walkers else None
     return (
-        None if stands is None else np.repeat(stands.positions[:1], frames, axis=0),
+        None if still is None else np.repeat(still.positions[:1], frames, axis=0),
         None if walks is None else walks.positions[:frames],
     )
 
@@ -219,10 +219,10 @@ def tried(
         progress: called with a line now and then.
     """
     bodies = {id(clip): Body(on_the_floor(clip.positions[:LONGEST]), FPS) for clip in clips}
-    found: dict[str, CheckTally] = {}
+    tallies: dict[str, CheckTally] = {}
     for check in checks:
         trial = trials[check.name]
-        tally = found[check.name] = CheckTally()
+        tally = tallies[check.name] = CheckTally()
         for kind, name, positions in examples(trial, clips):
             numbers = check.measured(positions, FPS)
             ok = check.obeyed(numbers)
@@ -236,24 +236,24 @@ def tried(
         wrong = [(c, check.obeyed(check.of(bodies[id(c)]))) for c in others(trial, clips)]
         tally.others = (sum(ok for _, ok in wrong), len(wrong))
         tally.slipped += [clip.name for clip, ok in wrong if ok]
-        stands, walks = standing_and_walking(clips, check.seconds)
-        tally.stands = stands is not None and check.obeyed(check.measured(stands, FPS))
+        still, walks = standing_and_walking(clips, check.seconds)
+        tally.stands = still is not None and check.obeyed(check.measured(still, FPS))
         tally.walks = walks is not None and check.obeyed(check.measured(walks, FPS))
         progress(f"{check.name}: {tally.shown} shown, {tally.made} made, {tally.others} others")
-    return found
+    return tallies
 
 
-def table(found: Mapping[str, CheckTally]) -> list[list[str]]:
+def table(tallies: Mapping[str, CheckTally]) -> list[list[str]]:
     """Rows of text, the heading first: check, passes of each kind as ``passed/tried``, and what is to be doubted."""
     rows = [["check", "real", "made of real", "other side", "other actions", "wrong", "doubts"]]
-    for name, tally in found.items():
+    for name, tally in tallies.items():
         pairs = (tally.shown, tally.made, tally.opposite, tally.others)
         counts = [f"{passed}/{tried}" if tried else "" for passed, tried in pairs]
         rows.append([name, *counts, f"{tally.wrong:.1%}", "; ".join(tally.doubts())])
     return rows
 
 
-def summary(found: Mapping[str, CheckTally]) -> dict[str, Any]:
+def summary(tallies: Mapping[str, CheckTally]) -> dict[str, Any]:
     """Everything as plain data for JSON, with the names of the clips that were judged wrongly."""
     return {
         name: {
@@ -262,15 +262,15 @@ def summary(found: Mapping[str, CheckTally]) -> dict[str, Any]:
             "wrong": round(tally.wrong, 4),
             "doubts": tally.doubts(),
         }
-        for name, tally in found.items()
+        for name, tally in tallies.items()
     }
 
 
 def trials() -> dict[str, Examples]:
     """How to find examples, by the name of the check."""
-    found = read_table("motionloom_lab.suites", "trial_clips.toml")
-    words = {f"@{name}": "|".join(items) for name, items in found.pop("words").items()}
-    return {name: _trial(entry, words) for name, entry in found.items()}
+    rows = read_table("motionloom_lab.suites", "trial_clips.toml")
+    words = {f"@{name}": "|".join(items) for name, items in rows.pop("words").items()}
+    return {name: _trial(entry, words) for name, entry in rows.items()}
 
 
 def _trial(entry: dict[str, Any], words: dict[str, str]) -> Examples:

@@ -143,8 +143,8 @@ def test_a_missing_weight_is_not_replaced_by_chance(clip_folder: Path, tmp_path:
     for file in clip_folder.iterdir():
         (tmp_path / file.name).write_bytes(file.read_bytes())
     tensors = load_file(clip_folder / "model.safetensors")
-    kept = {name: value for name, value in tensors.items() if name != "text_projection.weight"}
-    save_file(kept, tmp_path / "model.safetensors", {"format": "pt"})
+    rest = {name: value for name, value in tensors.items() if name != "text_projection.weight"}
+    save_file(rest, tmp_path / "model.safetensors", {"format": "pt"})
     with pytest.raises(MotionloomError, match=r"text_projection\.weight"):
         ClipText.open(tmp_path)
 

@@ -31,9 +31,9 @@ def run_build(arguments: argparse.Namespace) -> None:
     )
 
 
-def _reasons(said: list[str]) -> dict[str, str]:
+def _reasons(words: list[str]) -> dict[str, str]:
     """``NAME=REASON`` by name."""
-    return {name: reason for name, _, reason in (text.partition("=") for text in said)}
+    return {name: reason for name, _, reason in (text.partition("=") for text in words)}
 
 
 def run_look(arguments: argparse.Namespace) -> None:

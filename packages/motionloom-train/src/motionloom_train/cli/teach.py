@@ -1,4 +1,4 @@
-"""`motionloom teach`: an action or a style from a user's own few clips, as a small file for what draws."""
+"""`motionloom teach`: an action or a style from a user's own few clips, as a small file beside the weights."""
 
 import argparse
 import json
@@ -70,45 +70,43 @@ def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "t
 
     motions, findings = [], []
     for one in captioned:
-        found: Motion | MotionloomError
         try:
             unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc") else None
-            found = load(one.path, fps=arguments.source_fps, unit=unit)
-            found = stood_up(found) if arguments.up == "z" else found
-            motions.append(found)
+            motion = load(one.path, fps=arguments.source_fps, unit=unit)
+            motions.append(stood_up(motion) if arguments.up == "z" else motion)
+            findings.append(check_file(motions[-1]))
         except MotionloomError as error:
-            found = error
-        findings.append(check_file(found))
+            findings.append(check_file(error))
     return motions, findings
 
 
 def _report_check(arguments: argparse.Namespace, captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> int:
     """Print what is wrong with which clip; the exit code is 2 where something cannot be learned from."""
-    fatal = sum(any(one.fatal for one in found) for found in findings)
+    fatal = sum(any(one.fatal for one in own) for own in findings)
     if arguments.json:
         rows = [
             {
                 "clip": str(one.path),
                 "captions": list(one.captions),
-                "wrong": [f.sentence for f in found if f.fatal],
-                "remarks": [f.sentence for f in found if not f.fatal],
+                "wrong": [f.sentence for f in own if f.fatal],
+                "remarks": [f.sentence for f in own if not f.fatal],
             }
-            for one, found in zip(captioned, findings, strict=True)
+            for one, own in zip(captioned, findings, strict=True)
         ]
         print(json.dumps({"clips": rows, "usable": len(captioned) - fatal}, indent=1, ensure_ascii=False))
         return 2 if fatal else 0
-    for one, found in zip(captioned, findings, strict=True):
+    for one, own in zip(captioned, findings, strict=True):
         print(f"{one.path}: {'; '.join(one.captions)}")
-        for finding in found:
+        for finding in own:
             print(f"  {'wrong' if finding.fatal else 'remark'}: {finding.sentence}")
     print(f"{len(captioned) - fatal} of {len(captioned)} clips can be learned from")
     return 2 if fatal else 0
 
 
 def _refuse(captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> None:
-    """Raise MotionloomError for the first clip that nothing can be learned from; say what else there is."""
-    for one, found in zip(captioned, findings, strict=True):
-        for finding in found:
+    """Raise MotionloomError for the first clip that nothing can be learned from; print the remarks."""
+    for one, own in zip(captioned, findings, strict=True):
+        for finding in own:
             if finding.fatal:
                 fail(f"{one.path}: {finding.sentence}; leave it out or fix it ('motionloom teach --check' lists all)")
             print(f"motionloom: {one.path}: {finding.sentence}", file=sys.stderr)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from motionloom_train.loop import Training
 
 LABORATORY = "motionloom_lab"
-"""Reads the data sets and protocols that others published; opened where one is asked for."""
+"""Reads the data sets and protocols that others published; opened where one is needed."""
 
 
 def add(subparsers) -> None:
@@ -51,7 +51,7 @@ def train_on_pairs(arguments: argparse.Namespace) -> None:
 
 
 def _training(arguments: argparse.Namespace) -> "Training":
-    """The run of the recipe with its changes; checks and applies what is said about it."""
+    """The run of the recipe with its changes; checks and applies its options."""
     from motionloom_train.loop import Training
     from motionloom_train.recipe import changes, load_recipe
     from motionloom_train.tensors import set_threads

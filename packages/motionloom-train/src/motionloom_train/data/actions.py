@@ -1,6 +1,6 @@
 """Everyday actions by name: which captions name them, how else people say it, which part of a recording shows them.
 
-Training draws evenly over actions instead of over captions (`data.sets`), so that rare ones are seen as often as walks.
+Training samples actions evenly instead of captions (`data.sets`), so that rare ones are seen as often as walks.
 """
 
 import re
@@ -20,12 +20,12 @@ Kind = Literal["cycle", "repeats", "change", "once", "state"]
 PREFIX = "action:"
 """What the kind of a note begins with that names an action."""
 SENTENCES = 20
-"""Sentences made for an action besides the captions themselves."""
+"""Sentences generated for an action besides the captions themselves."""
 
 
 @dataclass(frozen=True)
 class Action:
-    """One entry of ``actions.toml``, which says what each part means."""
+    """One entry of ``actions.toml``, which explains each part."""
 
     name: str
     words: tuple[str, ...]
@@ -54,37 +54,37 @@ def _in_order(pattern: str, text: str) -> bool:
     """
     at = 0
     for part in pattern.split(".*"):
-        found = re.compile(part).search(text, at)
-        if found is None:
+        match = re.compile(part).search(text, at)
+        if match is None:
             return False
-        at = found.end()
+        at = match.end()
     return True
 
 
 def _read() -> dict[str, Action]:
     table = read_table("motionloom_train.data", "actions.toml")
-    made = {}
+    actions = {}
     for name, entry in table.items():
         words = entry.pop("words")
         entry["words"] = (words,) if isinstance(words, str) else tuple(words)
         phrases = {key: tuple(entry.pop(key, ())) for key in ("says", "sided")}
-        made[name] = Action(name, **phrases, **entry)
-    return made
+        actions[name] = Action(name, **phrases, **entry)
+    return actions
 
 
 ACTIONS: dict[str, Action] = _read()
 
 
 def action_of(texts: Sequence[str], clip: str = "") -> Action | None:
-    """The action that the name of the recording says, else the first that at least half of the captions name."""
+    """The action that the name of the recording names, else the first that at least half of the captions name."""
     by_clip = next((action for action in ACTIONS.values() if clip and re.search(action.clips, clip)), None)
     return by_clip or next((action for action in ACTIONS.values() if action.named_by(texts)), None)
 
 
 def side_of(texts: Sequence[str]) -> str:
     """``left`` or ``right`` where all captions that name a side name the same one, else empty."""
-    found = {side for text in texts for side in re.findall(r"\b(left|right)\b", text.lower())}
-    return found.pop() if len(found) == 1 else ""
+    sides = {side for text in texts for side in re.findall(r"\b(left|right)\b", text.lower())}
+    return sides.pop() if len(sides) == 1 else ""
 
 
 def sentences(action: Action, texts: Sequence[str] = (), *, side: str = "", count: int = SENTENCES) -> tuple[str, ...]:
@@ -95,8 +95,8 @@ def sentences(action: Action, texts: Sequence[str] = (), *, side: str = "", coun
     if not phrases:
         return ()
     rng = np.random.default_rng(int.from_bytes(action.name.encode()[:8].ljust(8), "little"))
-    said = (sentence(phrases[i % len(phrases)], rng) for i in range(max(count, 2 * len(phrases))))
-    return tuple(dict.fromkeys(said))
+    wordings = (sentence(phrases[i % len(phrases)], rng) for i in range(max(count, 2 * len(phrases))))
+    return tuple(dict.fromkeys(wordings))
 
 
 def core(positions: Array, fps: float, *, tail: float = 0.12) -> tuple[int, int]:

@@ -78,7 +78,7 @@ def extended(stretch: Array, frames: int) -> Array:
 
 def find_idle(clips: Sequence[Clip]) -> Idle:
     """The stretches of standing in recorded clips for training."""
-    found: list[tuple[float, Array]] = []
+    stretches: list[tuple[float, Array]] = []
     for clip in clips:
         if clip.way != "plain" or clip.split != "train" or clip.kind != "capture" or clip.name.startswith("M"):
             continue
@@ -87,9 +87,9 @@ def find_idle(clips: Sequence[Clip]) -> Idle:
             speed = np.linalg.norm(ph.velocity(positions[first:last], FPS), axis=-1).max(axis=1)
             alive = float((speed >= 0.2).mean())
             if alive >= _ALIVE:
-                found.append((alive, positions[first:last]))
-    found.sort(key=lambda one: -one[0])
-    return Idle(tuple(stretch for _, stretch in found[:MOST]))
+                stretches.append((alive, positions[first:last]))
+    stretches.sort(key=lambda one: -one[0])
+    return Idle(tuple(stretch for _, stretch in stretches[:MOST]))
 
 
 def _is_standing(positions: Array) -> np.ndarray:
@@ -145,8 +145,7 @@ def loop(features: np.ndarray, frames: int, *, blend: int = 5, limit: float = 0.
         pieces += [join, features[first + blend : last]]
         count += last - first
     pieces.append(features[last:])
-    joined = np.concatenate(pieces)
-    return joined[:frames].astype(np.float32)
+    return np.concatenate(pieces)[:frames].astype(np.float32)
 
 
 def bend(features: np.ndarray, rate: float) -> np.ndarray:

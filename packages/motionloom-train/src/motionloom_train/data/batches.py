@@ -1,4 +1,4 @@
-"""Training batches: which windows of a set are drawn, and how often."""
+"""Training batches: which windows of a set are sampled, and how often."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
 from motionloom.reading import read_table
 from motionloom_train.data.actions import PREFIX
-from motionloom_train.data.clips import MADE
+from motionloom_train.data.clips import GESTURE
 from motionloom_train.data.sets import Item, MotionSet
 
 SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
@@ -20,9 +20,9 @@ SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
 
 _ROWS = read_table("motionloom_train.data", "favour.toml")
 FAVOUR: dict[str, float] = _ROWS["labels"] | {f"action:{name}": often for name, often in _ROWS["actions"].items()}
-"""Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
-labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
-MADE_SHARE = 0.6
+"""Groups sampled more or less often than the others: what came out last, and what is requested most. A mixture of two
+labels is sampled 0.4 times as often, a generated gesture `GESTURE_SHARE` times."""
+GESTURE_SHARE = 0.6
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Batch:
 class Batches:
     """Draws batches; the draw of a step depends on the seed and the step alone, so that training resumes exactly.
 
-    All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
-    but at least 60 % of it are taken whole and padded. What an item needs to show what is said of it (`Item.core`) is
-    always within the window. Batches lie on the device of the set's features; what is random is drawn on the CPU.
+    All rows of a batch share a window (one of ``windows`` frames, sampled by ``shares``); items shorter than the window
+    but at least 60 % of it are whole and padded. What an item needs to show what its texts name (`Item.core`) is
+    always within the window. Batches lie on the device of the set's features; random numbers are generated on the CPU.
     """
 
     def __init__(
@@ -85,24 +85,24 @@ class Batches:
         features = self.data.features
         starts, lengths, texts, climbs = picked
         frames = torch.arange(window, device=picked.device)
-        shown = features[(starts[:, None] + frames).clamp(max=len(features) - 1)]
+        crops = features[(starts[:, None] + frames).clamp(max=len(features) - 1)]
         if picked.is_cuda or bool(climbs.any()):
-            shown = torch.where(climbs.bool()[:, None, None], shown - self._above_floor(shown), shown)
-        return Batch(shown * (frames < lengths[:, None])[..., None], lengths, texts)
+            crops = torch.where(climbs.bool()[:, None, None], crops - self._above_floor(crops), crops)
+        return Batch(crops * (frames < lengths[:, None])[..., None], lengths, texts)
 
-    def _above_floor(self, shown: Tensor) -> Tensor:
+    def _above_floor(self, crops: Tensor) -> Tensor:
         """How much windows (rows, frames, 263), standardised, are lowered so that their first frames touch the floor.
 
         Windows begin anywhere in a climb. Were they as high as they are in the recording, some would begin four metres
-        up, and a motion of the same words would be drawn up to there.
+        up, and a motion of the same words would be generated up to there.
         """
-        heights = shown[:, 0] * self._std + self._mean
+        heights = crops[:, 0] * self._std + self._mean
         lowest = heights.masked_fill(~self._heights, float("inf")).amin(-1, keepdim=True).clamp(min=0)
         return (lowest / self._std * self._heights)[:, None]
 
 
 class Pool(NamedTuple):
-    """The items that windows of one length may show, and how often each of them is drawn."""
+    """The items that windows of one length may show, and how often each of them is sampled."""
 
     numbers: np.ndarray
     """(items,) their places in `MotionSet.items`."""
@@ -120,7 +120,7 @@ class Pool(NamedTuple):
 
     @staticmethod
     def of(items: Sequence[Item], window: int, favour: Mapping[str, float]) -> "Pool":
-        """The kind of text is drawn first (`SHARE`), then for actions and measured labels the group, evenly but for
+        """The kind of text is sampled first (`SHARE`), then for actions and measured labels the group, evenly but for
         ``favour``, then the item by its weight: rare actions are seen as often as walks."""
         fitting: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(items):
@@ -134,17 +134,17 @@ class Pool(NamedTuple):
             for name, inside in groups.items():
                 share = kinds * favoured[name] / (sum(favoured.values()) * sum(items[n].weight for n in inside))
                 often |= {n: share * items[n].weight for n in inside}
-        kept = [items[number] for number in often]
-        lengths = [min(item.frames, window) for item in kept]
-        spans = [_starts(item, length) for item, length in zip(kept, lengths)]
+        members = [items[number] for number in often]
+        lengths = [min(item.frames, window) for item in members]
+        spans = [_starts(item, length) for item, length in zip(members, lengths)]
         return Pool(
             np.array(list(often), dtype=np.int64),
             np.cumsum(list(often.values())),
             np.array(lengths, dtype=np.int64),
             np.array(spans, dtype=np.int64).reshape(-1, 2),
-            Ragged.of([_rests(item, length) for item, length in zip(kept, lengths)]),
-            Ragged.of([item.texts for item in kept]),
-            np.array([item.group in CLIMBS for item in kept], dtype=bool),
+            Ragged.of([_rests(item, length) for item, length in zip(members, lengths)]),
+            Ragged.of([item.texts for item in members]),
+            np.array([item.group in CLIMBS for item in members], dtype=bool),
         )
 
     def draw(self, rng: np.random.Generator, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -181,7 +181,7 @@ class Ragged(NamedTuple):
 
 
 def _favour(name: str, favour: Mapping[str, float]) -> float:
-    usual = 0.4 if "+" in name else MADE_SHARE if name.startswith(PREFIX + MADE) else 1.0
+    usual = 0.4 if "+" in name else GESTURE_SHARE if name.startswith(PREFIX + GESTURE) else 1.0
     return favour.get(name, usual)
 
 
@@ -190,7 +190,7 @@ CLIMBS = {"climb", "climb stairs", f"{PREFIX}climb ladder", f"{PREFIX}stairs"}
 HEIGHTS = [LAYOUT["root_height"].start, *range(LAYOUT["ric"].start + 1, LAYOUT["ric"].stop, 3)]
 """Features that are heights over the floor."""
 BEFORE, ABOUT = 16, 2
-"""Frames of a window before a change begins (people begin soon after they are told to), give or take so many."""
+"""Frames of a window before a change begins (people begin soon after a command), give or take so many."""
 
 
 def _rests(item: Item, length: int) -> list[int]:
@@ -203,8 +203,8 @@ def _starts(item: Item, length: int) -> tuple[int, int]:
     """Where a window of so many frames may begin, half-open: within the item, with its core inside.
 
     The core begins at about the same time in every window (`BEFORE`, give or take `ABOUT`): were it anywhere, the
-    average over what a window may show would be a person who stays halfway, and a small network under much noise draws
-    averages.
+    average over what a window may show would be a person who stays halfway, and a small network under much noise
+    generates averages.
     """
     low, high = item.start, item.start + item.frames - length
     if item.core is None:

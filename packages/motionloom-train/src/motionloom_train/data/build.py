@@ -66,16 +66,16 @@ def clips_of(take: Take, *, check: Callable[[Places, Clip], None] | None = None)
 
     check: called with what was recorded and the first clip, before any is yielded; what it raises ends the take.
     """
-    read = take.read()
-    if isinstance(read, np.ndarray):  # finished HumanML3D features
-        yield from _with_mirror(_clip(take, np.asarray(read, dtype=np.float32), "plain"))
+    recording = take.read()
+    if isinstance(recording, np.ndarray):  # finished HumanML3D features
+        yield from _with_mirror(_clip(take, np.asarray(recording, dtype=np.float32), "plain"))
         return
-    positions = uniform_person(read.positions, read.fps)
+    positions = uniform_person(recording.positions, recording.fps)
     if len(positions) <= SHORTEST:
         raise MotionloomError(f"only {len(positions) / FPS:.2f} s long; at least {SHORTEST / FPS:.0f} s are needed")
     clip = _clip(take, hml.encode(positions, heading="corrected"), "plain")
     if check is not None:
-        check(read, clip)
+        check(recording, clip)
     yield from _with_mirror(clip)
     if take.split == "train":
         yield from _more(take, clip, positions)
@@ -122,37 +122,37 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
         if last - first >= SHORTEST and span.texts:
             notes.append(Note(first, last, span.kind, span.texts))
             notes += _action_notes(span, features[first:last], first, name=take.name)
-    said = " | ".join(text for span in take.spans for text in span.texts)
-    found = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, said)
-    if way == "bent":  # who stands there is turned like a statue
-        found = [(a, b, label) for a, b, label in found if not label.startswith("turn ")]
-    notes += [Note(a, b, label) for a, b, label in join_spans(found)]
+    words = " | ".join(text for span in take.spans for text in span.texts)
+    windows = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, words)
+    if way == "bent":  # somebody who stands is turned like a statue
+        windows = [(a, b, label) for a, b, label in windows if not label.startswith("turn ")]
+    notes += [Note(a, b, label) for a, b, label in join_spans(windows)]
     suffix = "" if way == "plain" else f"_{way}"
     return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features, take.kind)
 
 
 def _action_notes(span: Span, features: np.ndarray, first: int, *, name: str) -> list[Note]:
-    """The note of the action that a described stretch shows, if its captions or the clip's name say one."""
+    """The note of the action that a described stretch shows, if its captions or the clip's name have one."""
     action, last = action_of(span.texts, name), first + len(features)
     if action is None or len(features) < SHORTEST:
         return []
     positions = hml.decode_positions(features.astype(np.float64))
     by_name = bool(re.search(action.clips, name))  # its captions may be wrong
-    said = side_of([*re.findall("left|right", name.lower())]) if by_name else side_of(span.texts)
+    side_word = side_of([*re.findall("left|right", name.lower())]) if by_name else side_of(span.texts)
     side = strike(positions, FPS, action.limb)[1] if action.limb else turned_to(positions) if action.turns else ""
-    texts = sentences(action, side=side or said)
+    texts = sentences(action, side=side or side_word)
     if not texts:
         return []
-    kept = None
+    whole = None
     if action.kind in ("change", "once"):
-        kept = (first, last)
+        whole = (first, last)
         if len(features) > LONG:
             begin, end = core(positions, FPS)
-            kept = (first + begin, first + end)
-    written = span.texts if span.kind == "human" and not by_name and not action.turns else ()
-    if action.name in SEATED and written and hands_up(positions):
-        texts = ()  # people take a seat with their hands down: `held_clips` makes that
-    return [Note(first, last, PREFIX + action.name, (*written, *texts), kept)]
+            whole = (first + begin, first + end)
+    captions = span.texts if span.kind == "human" and not by_name and not action.turns else ()
+    if action.name in SEATED and captions and hands_up(positions):
+        texts = ()  # people take a seat with their hands down, as `held_clips` shows them
+    return [Note(first, last, PREFIX + action.name, (*captions, *texts), whole)]
 
 
 def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
@@ -185,7 +185,7 @@ _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
 
 def _mirrored_texts(note: Note) -> tuple[str, ...]:
     action = ACTIONS.get(note.kind.removeprefix(PREFIX))
-    if action and action.turns:  # what is said of a turn to the left says nothing of one to the right
+    if action and action.turns:  # words for a turn to the left do not fit one to the right
         return sentences(action, side="right" if side_of(note.texts) == "left" else "left")
     return tuple(mirror_text(text) for text in note.texts)
 
@@ -209,7 +209,7 @@ Finder = Callable[..., list[Take]]
 
 @dataclass(frozen=True)
 class Job:
-    """One take to be made into clips."""
+    """One take that becomes clips."""
 
     folder: str
     captions: str
@@ -259,7 +259,7 @@ def build(
 
     A take whose clip does not show its recording (`data.gate`) is dropped.
 
-    exclude: takes whose names begin with one of these are left out, and so is all that would be made of them.
+    exclude: takes whose names begin with one of these are left out, and so are all clips derived from them.
     allow: beginnings of names of takes that come in all the same, and why.
     find: what finds the takes of a folder.
     """
@@ -273,20 +273,20 @@ def build(
     for part in ("clips", gate.FOLDER, "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
         sweep(out / part)
-    left = [job for job in jobs if not _is_done(job)]
-    progress(f"{len(left)} takes to do, {len(jobs) - len(left)} already done")
-    for number, (name, reason) in enumerate(_run(left, workers), start=1):
+    rest = [job for job in jobs if not _is_done(job)]
+    progress(f"{len(rest)} takes to do, {len(jobs) - len(rest)} already done")
+    for number, (name, reason) in enumerate(_run(rest, workers), start=1):
         if reason:
             progress(f"dropped {name}: {reason}")
         if number % 100 == 0:
-            progress(f"{number} of {len(left)} takes done")
+            progress(f"{number} of {len(rest)} takes done")
     return _finish(out, mixed, progress)
 
 
 def _is_done(job: Job) -> bool:
     """Whether an earlier build finished the take; what it refused and is allowed now is done again."""
-    done = (Path(job.out) / "done" / job.name).exists()
-    return done and not (job.allowed and gate.refused(Path(job.out), job.name))
+    complete = (Path(job.out) / "done" / job.name).exists()
+    return complete and not (job.allowed and gate.refused(Path(job.out), job.name))
 
 
 def _without(jobs: list[Job], exclude: Sequence[str]) -> list[Job]:
@@ -321,17 +321,17 @@ def _jobs(
     find: Finder,
     progress: Say,
 ) -> Iterator[Job]:
-    seen: dict[str, str] = {}
+    origins: dict[str, str] = {}
     for folder in folders:
         for take in find(folder, captions=captions):
             if not _NAME.fullmatch(take.name):
                 raise MotionloomError(
                     f"{folder}: {take.name!r} cannot be the name of a clip; use letters, digits, _ - ."
                 )
-            if take.name in seen:
-                progress(f"dropped a second {take.name} in {folder}: the one in {seen[take.name]} is used")
+            if take.name in origins:
+                progress(f"dropped a second {take.name} in {folder}: the one in {origins[take.name]} is used")
                 continue
-            seen[take.name] = str(folder)
+            origins[take.name] = str(folder)
             yield Job(str(folder), str(captions or ""), take.name, str(out), find)
 
 
@@ -372,7 +372,7 @@ def _finish(out: Path, mixed: int, progress: Say) -> Path:
         clips.append(clip)
     derived = {path.stem for path in finished(out / "clips", "*.safetensors") if _DERIVED.match(path.stem)}
     for old in derived - {clip.name for clip in clips}:
-        (out / "clips" / f"{old}.safetensors").unlink()  # of a build that was asked for more of them
+        (out / "clips" / f"{old}.safetensors").unlink()  # of a build with more of them
     if not clips:
         raise MotionloomError(f"no take could be used; the reasons stand in {out / 'done'}")
     dropped = {p.name: text for p in finished(out / "done", "*") if (text := p.read_text(encoding="utf-8"))}
@@ -387,7 +387,7 @@ def _finish(out: Path, mixed: int, progress: Say) -> Path:
 
 
 def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
-    """Clips made of others of the same licence, as many as its share of all frames; most with their mirror image."""
+    """Clips derived from those of the same licence, by its share of all frames; most with their mirror image."""
     frames = sum(len(clip.features) for clip in clips)
     for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
         same = [clip for clip in clips if clip.licence == licence]

@@ -1,4 +1,4 @@
-"""The clips of a built set: features with what people say of them, one safetensors file each."""
+"""The clips of a built set: features with captions, one safetensors file each."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -21,7 +21,7 @@ MAX_BYTES = 256 << 20
 """Of a clip's file: more than an hour and a half of features."""
 SHORTEST = 20
 """Frames of the shortest stretch that is described."""
-THEN, MADE = "then", "made "
+THEN, GESTURE = "then", "made "
 """Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
 KINDS = ("capture", "keyed", "made")
 
@@ -37,7 +37,7 @@ class Note:
     texts: tuple[str, ...] = ()
     """Sentences or verb phrases; empty for measured labels, whose wordings are in `data.words`."""
     core: tuple[int, int] | None = None
-    """Frames (first, end) of the clip that a training window must hold whole; None: any part shows what is said."""
+    """Frames (first, end) of the clip that a training window must hold whole; None: any part shows the action."""
 
 
 @dataclass(frozen=True)
@@ -112,12 +112,12 @@ def _check_clip(clip: Clip) -> None:
 def _check_note(note: Note, frames: int) -> None:
     if not 0 <= note.first < note.last <= frames:
         raise ValueError(f"a note spans frames {note.first} to {note.last} of {frames}")
-    written = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
+    verbal = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
     if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
         raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
-    if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
+    if not all(isinstance(t, str) for t in note.texts) or (verbal and not note.texts):
         raise ValueError(f"a note of kind {note.kind} lacks its texts")
     for text in note.texts:
         check_caption(text)
-    if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
+    if not verbal and not all(label in LABELS for label in note.kind.split("+", 1)):
         raise ValueError(f"there is no label {note.kind!r}")

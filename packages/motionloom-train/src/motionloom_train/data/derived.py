@@ -1,4 +1,4 @@
-"""Training clips made from others: short changes held, actions joined, gestures made, arms of one on another's walk."""
+"""Training clips derived from others: short changes held, actions joined, gestures, arms of one on another's walk."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment
 from motionloom_train.data.actions import ACTIONS, PREFIX, Action, sentences, side_of, turned_to
 from motionloom_train.data.augment import Idle
-from motionloom_train.data.clips import MADE, SHORTEST, THEN, Clip, Note
+from motionloom_train.data.clips import GESTURE, SHORTEST, THEN, Clip, Note
 from motionloom_train.data.made import GESTURES, Gesture, hands_up, lower_arms, perform, words_for
 from motionloom_train.data.person import at_origin
 from motionloom_train.data.postures import assume, postures
@@ -24,8 +24,8 @@ BRIEFLY = 20
 """Frames for which a pose is held in which nobody stays."""
 LYING = 80
 """Frames, at least, for which somebody stays who has lain down."""
-SHOWN = 80
-"""Frames that a recording goes on for, at least, on which a gesture is made."""
+GESTURING = 80
+"""Least frames of a recording that a gesture is added to."""
 SEATED = ("sit down", "stand up", "sit down and stand up")
 
 
@@ -39,7 +39,7 @@ def looped(clip: Clip) -> Iterator[Clip]:
 
 
 def held_clips(clips: Sequence[Clip], idle: Idle) -> Iterator[Clip]:
-    """Short examples of an action at the lengths that are asked for: somebody stands, or stays, before and after.
+    """Short examples of an action at the lengths that people request: somebody stands, or stays, before and after.
 
     clips: of one licence; of the recorded ones for training. What runs backwards as another action (sitting down as
     standing up) does so too.
@@ -49,11 +49,11 @@ def held_clips(clips: Sequence[Clip], idle: Idle) -> Iterator[Clip]:
             continue
         positions = clip.positions()
         seed = int.from_bytes(clip.name.encode(), "little") % 2**32
-        made = 0
+        total = 0
         for number, note in enumerate(_actions(clip)):
             for longer in _held_ways(clip, note, positions, seed=seed + 2 * number, idle=idle):
-                yield replace(longer, name=f"held_{made}_{clip.name}")
-                made += 1
+                yield replace(longer, name=f"held_{total}_{clip.name}")
+                total += 1
 
 
 def _actions(clip: Clip) -> list[Note]:
@@ -71,38 +71,38 @@ def _held_ways(clip: Clip, note: Note, positions: Array, *, seed: int, idle: Idl
     first, last = note.core or (note.first, note.last)
     cut = positions[first : last + 1]
     for reverse in (False, True)[: 1 + bool(action.reverse)]:
-        shown = augment.reversed_in_time(cut) if reverse else cut
+        stretch = augment.reversed_in_time(cut) if reverse else cut
         texts = sentences(ACTIONS[action.reverse]) if reverse else note.texts
         name = action.reverse if reverse else action.name
-        if name in SEATED and hands_up(shown):
-            shown, texts = lower_arms(shown), sentences(ACTIONS[name])
-        yield from _held(clip, shown, PREFIX + name, texts, seed=seed + reverse, idle=idle)
+        if name in SEATED and hands_up(stretch):
+            stretch, texts = lower_arms(stretch), sentences(ACTIONS[name])
+        yield from _held(clip, stretch, PREFIX + name, texts, seed=seed + reverse, idle=idle)
 
 
 def _held(
-    clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: int, idle: Idle = augment.NO_IDLE
+    clip: Clip, stretch: Array, kind: str, texts: tuple[str, ...], *, seed: int, idle: Idle = augment.NO_IDLE
 ) -> Iterator[Clip]:
     posture = kind.removeprefix(PREFIX) in POSTURES
     fastest = 1.2 if posture else 0.45
-    start, end = (augment.can_hold(shown, FPS, end=at_end, fastest=fastest) for at_end in (False, True))
-    if not (start or end) or len(shown) < SHORTEST:
+    start, end = (augment.can_hold(stretch, FPS, end=at_end, fastest=fastest) for at_end in (False, True))
+    if not (start or end) or len(stretch) < SHORTEST:
         return
     rng = np.random.default_rng(seed)
-    room = max(150 - len(shown), 30)
+    room = max(150 - len(stretch), 30)
     before = int(rng.integers(8, min(55, room))) if start else 0
     lies = kind == PREFIX + "lie down"
     after = max(room - before, LYING if lies else 25) if end else 0
     if not posture:  # nobody stays in the middle of a movement
-        before = before if augment.stands_on(shown[0], idle) else min(before, BRIEFLY)
-        after = after if augment.stands_on(shown[-1], idle) else min(after, BRIEFLY)
-    longer = augment.with_pauses(shown, before, after, fps=FPS, seed=seed, idle=idle)
+        before = before if augment.stands_on(stretch[0], idle) else min(before, BRIEFLY)
+        after = after if augment.stands_on(stretch[-1], idle) else min(after, BRIEFLY)
+    longer = augment.with_pauses(stretch, before, after, fps=FPS, seed=seed, idle=idle)
     features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
-    whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
-    low = {"lie down": shown[-1], "get up": shown[0]}.get(kind.removeprefix(PREFIX))
+    whole = (max(before - 3, 0), min(before + len(stretch) + 2, len(features)))
+    low = {"lie down": stretch[-1], "get up": stretch[0]}.get(kind.removeprefix(PREFIX))
     if low is not None and not faces_up(low):
         texts = tuple(text for text in texts if "the back" not in text) or sentences(ACTIONS[kind.removeprefix(PREFIX)])
     notes = [Note(0, len(features), kind, texts, whole)]
-    if lies and len(features) - whole[1] >= SHORTEST and faces_up(shown[-1]):
+    if lies and len(features) - whole[1] >= SHORTEST and faces_up(stretch[-1]):
         notes.append(Note(whole[1], len(features), PREFIX + "lie", sentences(ACTIONS["lie"])))
     yield _derived(clip, features, "held", tuple(notes))
 
@@ -123,10 +123,10 @@ def laid_down(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = aug
     crouches, lies = (
         [one for one in pool.get(name, ()) if one[0].way == "plain"] for name in ("crouch", "crouch to lie")
     )
-    rng, made = np.random.default_rng(seed), 0
+    rng, total = np.random.default_rng(seed), 0
     pairs = [(a, b) for a in crouches for b in lies]
     for number in rng.permutation(len(pairs)):
-        if made >= count:
+        if total >= count:
             return
         first, second = (_core_positions(clip, note, rng) for clip, note in pairs[number])
         first = first[: int(first[:, 0, 1].argmin()) + 1]
@@ -134,11 +134,11 @@ def laid_down(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = aug
         if both is None or not 30 <= len(both) <= 180:
             continue
         clip = pairs[number][1][0]
-        for name, shown in (("lie down", both), ("get up", augment.reversed_in_time(both))):
+        for name, stretch in (("lie down", both), ("get up", augment.reversed_in_time(both))):
             texts = sentences(ACTIONS[name])
-            for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number), idle=idle):
-                yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{made}", way="joined")
-        made += 1
+            for longer in _held(clip, stretch, PREFIX + name, texts, seed=seed * 100_003 + int(number), idle=idle):
+                yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{total}", way="joined")
+        total += 1
 
 
 def sat_and_risen(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
@@ -146,33 +146,33 @@ def sat_and_risen(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
 
     Recordings hold several of them in a row. At most ``count``; training clips of one licence.
     """
-    rng, made = np.random.default_rng(seed), 0
+    rng, total = np.random.default_rng(seed), 0
     for number, (clip, note) in enumerate(_by_action(clips).get("sit down", [])):
-        if made >= count or clip.way != "plain":
+        if total >= count or clip.way != "plain":
             continue
         first, last = note.core or (note.first, note.last)
-        shown = clip.positions(first, last)
-        shown = lower_arms(shown) if hands_up(shown) else shown
-        if not (28 <= len(shown) <= 60 and augment.can_hold(shown, FPS, end=True, fastest=1.2)):
+        stretch = clip.positions(first, last)
+        stretch = lower_arms(stretch) if hands_up(stretch) else stretch
+        if not (28 <= len(stretch) <= 60 and augment.can_hold(stretch, FPS, end=True, fastest=1.2)):
             continue
-        sat = augment.with_pauses(shown, 0, int(rng.integers(12, 24)), fps=FPS, seed=seed * 100_003 + number)
-        both = augment.joined(sat, augment.reversed_in_time(shown), limit=0.3)
+        sat = augment.with_pauses(stretch, 0, int(rng.integers(12, 24)), fps=FPS, seed=seed * 100_003 + number)
+        both = augment.joined(sat, augment.reversed_in_time(stretch), limit=0.3)
         if both is None:
             continue
         texts = sentences(ACTIONS["sit down and stand up"])
         kind = PREFIX + "sit down and stand up"
         for longer in _held(clip, both, kind, texts, seed=seed * 100_003 + number, idle=idle):
-            yield replace(longer, name=f"joined_{seed}_sat{made}", way="joined")
-            made += 1
+            yield replace(longer, name=f"joined_{seed}_sat{total}", way="joined")
+            total += 1
 
 
 def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """One action and then another, where the poses in between agree; training clips of one licence."""
     rng = np.random.default_rng(seed)
     pool = _by_action(clips)
-    names, made = sorted(pool), 0
+    names, total = sorted(pool), 0
     for number in range(60 * count if names else 0):
-        if made == count:
+        if total == count:
             return
         pair = [ACTIONS[names[i]] for i in rng.integers(len(names), size=2)]
         if number % 6 == 0 and {"kick", "punch"} <= pool.keys():  # fighters do both; their guards agree
@@ -186,18 +186,18 @@ def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = 
             continue
         first, second = (_phrases(action, note) for action, (_, note) in zip(pair, picked))
         texts = _linked(first, second, rng)
-        name = f"joined_{seed}_{made:04d}"
+        name = f"joined_{seed}_{total:04d}"
         keyed = "keyed" if any(clip.kind == "keyed" for clip, _ in picked) else "capture"
         base = Clip(
             name, picked[0][0].source, picked[0][0].licence, "train", "joined", (), picked[0][0].features, keyed
         )
         for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number, idle=idle):
-            made += 1
+            total += 1
             yield replace(clip, name=name, way="joined")
 
 
 def _by_action(clips: Sequence[Clip]) -> dict[str, list[tuple[Clip, Note]]]:
-    """Training clips and their notes, by the name of the action that the note says they show."""
+    """Training clips and their notes, by the name of the note's action."""
     pool: dict[str, list[tuple[Clip, Note]]] = {}
     for clip in clips:
         for note in clip.notes:
@@ -207,7 +207,7 @@ def _by_action(clips: Sequence[Clip]) -> dict[str, list[tuple[Clip, Note]]]:
 
 
 def _linked(first: Sequence[str], second: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Sentences of one action and then another, each with phrases drawn anew."""
+    """Sentences of one action and then another, each with new random phrases."""
     texts = []
     for link in ("and then", "and", "then"):
         a, b = rng.choice(first), rng.choice(second)
@@ -233,7 +233,7 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
     one licence."""
     rng = np.random.default_rng(seed)
     bodies = _labelled(clips, ("stand", "walk", "sit"))
-    bodies["walk"] = [(clip, note) for clip, note in bodies.get("walk", []) if note.last - note.first >= SHOWN]
+    bodies["walk"] = [(clip, note) for clip, note in bodies.get("walk", []) if note.last - note.first >= GESTURING]
     bodies["stop"] = [(clip, note) for clip, note in _by_action(clips).get("stop walking", []) if note.core]
     usual = [k for k in ("stand", "stand", "stand", "stand", "walk", "walk", "sit", "stop") if bodies.get(k)]
     for number in range(count if bodies.get("stand") else 0):
@@ -253,11 +253,11 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
         if texts:
             first = max(0, round(FPS * begin))
             end = min(first + 30 * max(1, gesture.times), len(features))
-            core, group = (first, end), PREFIX + MADE + gesture.name
+            core, group = (first, end), PREFIX + GESTURE + gesture.name
             if gesture.on == where:
                 core = (0, min(60, len(features)))
             elif where == "stop":
-                core, group = (max(0, first - 25), end), PREFIX + MADE + STOPPED
+                core, group = (max(0, first - 25), end), PREFIX + GESTURE + STOPPED
             notes = (Note(0, len(features), group, texts, core),)
             yield Clip(
                 f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
@@ -265,7 +265,7 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
 
 
 LEADS = {"stand": "", "walk": "walks", "sit": "sits", "stop": "walks up, stops"}
-"""What is said of the body before the gesture."""
+"""Words for the body before the gesture."""
 GREETINGS = ("wave", "wave", "wave", "wave both", "point", "salute", "clap")
 STOPPED = "behind a walk"
 """The group of gestures of people who have just stopped."""
@@ -274,8 +274,8 @@ STOPPED = "behind a walk"
 def _gesturing(
     below: Clip, note: Note, gesture: Gesture, where: str, *, seed: int, idle: Idle, rng: np.random.Generator
 ) -> tuple[Array, float]:
-    """The body (frames, 22, 3) metres on which a gesture is made, and the second at which it begins."""
-    frames = int(rng.integers(SHOWN, 160))
+    """The body (frames, 22, 3) metres to which a gesture is added, and the second at which it begins."""
+    frames = int(rng.integers(GESTURING, 160))
     length = min(note.last - note.first, frames)
     first = note.first + int(rng.integers(note.last - note.first - length + 1))
     begin = -1.0 if gesture.on == where else float(rng.uniform(0.8, 1.0))
@@ -289,7 +289,7 @@ def _gesturing(
     body = at_origin(body if alive is None else alive)
     if where == "stand" and alive is None and rng.random() < 0.7:
         body = lower_arms(body)
-    needed = max(round(FPS * (begin + 1.5 * gesture.times)), 0 if where == "walk" else SHOWN)
+    needed = max(round(FPS * (begin + 1.5 * gesture.times)), 0 if where == "walk" else GESTURING)
     needed = max(needed, round(FPS * begin) + 60) if where == "stop" else needed
     if needed > len(body):
         body = augment.with_pauses(body, 0, needed - len(body), fps=FPS, seed=seed, idle=idle)
@@ -329,12 +329,12 @@ def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = a
 
 
 def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:
-    found: dict[str, list[tuple[Clip, Note]]] = {}
+    pool: dict[str, list[tuple[Clip, Note]]] = {}
     for clip in clips:
         for note in clip.notes:
             if note.kind in labels and clip.split == "train" and note.last - note.first >= 50:
-                found.setdefault(note.kind, []).append((clip, note))
-    return found
+                pool.setdefault(note.kind, []).append((clip, note))
+    return pool
 
 
 def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
@@ -343,7 +343,7 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
     A tenth of ``count`` of each posture.
     """
     rng = np.random.default_rng(seed)
-    bodies = [found for found in _labelled(clips, ("stand",)).get("stand", []) if _stands_plainly(*found)]
+    bodies = [pair for pair in _labelled(clips, ("stand",)).get("stand", []) if _stands_plainly(*pair)]
     for number in range(round(count / 10) if bodies else 0):
         below, note = bodies[rng.integers(len(bodies))]
         body = idle.body(LOOPED, rng)
@@ -356,14 +356,14 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
         )
         for kind, posture in enumerate(postures(body, rng)):
             begin = float(rng.uniform(0.8, 1.0))
-            frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
-            shown = assume(body[:frames], posture, fps=FPS, begin=begin)
+            frames = min(len(body), round(FPS * (begin + posture.seconds(stay=float(rng.uniform(1.5, 4.0))))))
+            stretch = assume(body[:frames], posture, fps=FPS, begin=begin)
             if posture.arms_out:
-                shown = perform(shown, GESTURES["arms out"], "", fps=FPS, begin=begin, rng=rng)
-            features = hml.encode(at_origin(shown), heading="corrected")
+                stretch = perform(stretch, GESTURES["arms out"], "", fps=FPS, begin=begin, rng=rng)
+            features = hml.encode(at_origin(stretch), heading="corrected")
             action = ACTIONS[posture.action]
             texts = sentences(action, side=posture.side)
-            lasts = 2.0 if action.kind == "cycle" else posture.seconds(kept=0.5)
+            lasts = 2.0 if action.kind == "cycle" else posture.seconds(stay=0.5)
             start, end = round(FPS * begin), min(round(FPS * (begin + lasts)), len(features))
             whole = None if action.kind == "repeats" else (start, end)
             notes = (Note(0, len(features), PREFIX + action.name, texts, whole),)
@@ -386,12 +386,12 @@ def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle 
     Recordings hold only a few. A tenth of ``count``.
     """
     rng = np.random.default_rng(seed)
-    found = _labelled(clips, ("walk",))
-    walks = [f for f in found.get("walk", []) if f[0].way in ("plain", "looped")]
+    walks = _labelled(clips, ("walk",)).get("walk", [])
+    walks = [(clip, note) for clip, note in walks if clip.way in ("plain", "looped")]
     turns = [turn for clip in clips for turn in _half_turns(clip)]
-    action, made = ACTIONS["walk turn around"], 0
+    action, total = ACTIONS["walk turn around"], 0
     for _ in range(4 * count if walks and turns else 0):
-        if made == round(count / 10):
+        if total == round(count / 10):
             return
         base, turn = turns[rng.integers(len(turns))]
         ends = [_walk(*walks[rng.integers(len(walks))], rng) for _ in range(2)]
@@ -403,8 +403,8 @@ def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle 
         turns_at = (max(0, cut - 32), len(features))  # about 2.4 s into every window
         texts = sentences(action, side=turned_to(whole))
         notes = (Note(0, len(features), PREFIX + action.name, texts, turns_at),)
-        yield replace(base, name=f"there_{seed}_{made:03d}", way="joined", notes=notes, features=features)
-        made += 1
+        yield replace(base, name=f"there_{seed}_{total:03d}", way="joined", notes=notes, features=features)
+        total += 1
 
 
 def _walk(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
@@ -436,8 +436,7 @@ def _between(first: Array, middle: Array, last: Array) -> Array | None:
     both = augment.joined(first, middle)
     if both is None:
         return None
-    begin = _alike(last, middle[-1], 0, len(last) - 25)
-    return augment.joined(both, last[begin:])
+    return augment.joined(both, last[_alike(last, middle[-1], 0, len(last) - 25) :])
 
 
 def _alike(p: Array, pose: Array, low: int, high: int) -> int:

@@ -7,7 +7,7 @@ asked for are lengthened: a gait goes on as a loop, anything else is held at bot
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,12 +34,12 @@ MOST_FRAMES = 20 * 300
 MAX_CAPTION, MAX_CAPTIONS = 300, 64
 MAX_BYTES = 1 << 20
 ONE_SIDED = re.compile(r"\b(salut|violin|guitar|handshak|shak\w+ hands|writ(?:es|ing)|steering)", re.IGNORECASE)
-"""What people do with a certain hand although nobody says so: not mirrored."""
+"""What people do with a certain hand although no word says which: not mirrored."""
 
 
 @dataclass(frozen=True)
 class CaptionedClip:
-    """A clip's file and what is said of it."""
+    """A clip's file and its captions."""
 
     path: Path
     captions: tuple[str, ...]
@@ -53,7 +53,7 @@ class Example:
     captions: tuple[str, ...]
     features: np.ndarray
     """(frames, 263) float32, not standardised."""
-    shown: tuple[int, int]
+    span: tuple[int, int]
     """The frames (half-open) that were recorded; the rest holds the pose. A window shows all of them if it can."""
     looped: bool = False
 
@@ -62,12 +62,12 @@ class Example:
 
 
 def find_examples(places: Sequence[Path | str], caption: str = "") -> list[CaptionedClip]:
-    """The clips among files and folders, in order, with what is said of each.
+    """The clips among files and folders, in order, with their captions.
 
-    Of a clip speaks, first come first served: ``NAME.txt`` beside it, a caption on each line; lines ``NAME: caption``
+    A clip's captions are the first of: ``NAME.txt`` beside it, a caption on each line; lines ``NAME: caption``
     in a ``captions.txt`` in its folder; ``caption``; and, for clips found in a folder that is named, the name of the
     clip's own folder (``a_zombie_walks/01.bvh``). Raises `MotionloomError` for places without clips, for too many of
-    them, for clips that nothing is said of, and for captions that are none.
+    them, for clips without captions, and for captions that are none.
     """
     if caption:
         _check_caption(caption, "the caption")
@@ -89,7 +89,7 @@ def find_examples(places: Sequence[Path | str], caption: str = "") -> list[Capti
             )
     if not files:
         raise MotionloomError("there is no clip; give 1 to 20 motion files, or folders of them")
-    return [CaptionedClip(path, _captions_of(path, caption, in_folder=found)) for path, found in files.items()]
+    return [CaptionedClip(path, _captions_of(path, caption, in_folder=named)) for path, named in files.items()]
 
 
 def _captions_of(path: Path, caption: str, *, in_folder: bool) -> tuple[str, ...]:
@@ -98,9 +98,9 @@ def _captions_of(path: Path, caption: str, *, in_folder: bool) -> tuple[str, ...
         lines = [line for line in _lines(own) if line.strip() and not line.lstrip().startswith("#")]
         return tuple(_check_caption(line, str(own)) for line in lines[:MAX_CAPTIONS]) or _none(path)
     if shared.is_file():
-        found = [words for name, words in map(_named, _lines(shared)) if name in (path.name, path.stem)]
-        if found:
-            return tuple(_check_caption(words, str(shared)) for words in found[:MAX_CAPTIONS])
+        texts = [words for name, words in map(_named, _lines(shared)) if name in (path.name, path.stem)]
+        if texts:
+            return tuple(_check_caption(words, str(shared)) for words in texts[:MAX_CAPTIONS])
     if caption:
         return (" ".join(caption.split()),)
     if in_folder:
@@ -128,12 +128,12 @@ def _lines(path: Path) -> list[str]:
 
 
 def _check_caption(words: str, place: str) -> str:
-    said = " ".join(words.split())
-    if not said or len(said) > MAX_CAPTION or not said.isprintable() or not any(c.isalpha() for c in said):
+    caption = " ".join(words.split())
+    if not caption or len(caption) > MAX_CAPTION or not caption.isprintable() or not any(c.isalpha() for c in caption):
         raise MotionloomError(
-            f"{place} says {said[:60]!r}, which is no caption; write a sentence of at most {MAX_CAPTION} letters"
+            f"{place} says {caption[:60]!r}, which is no caption; write a sentence of at most {MAX_CAPTION} letters"
         )
-    return said
+    return caption
 
 
 # A clip as features
@@ -150,10 +150,8 @@ def make_examples(motion: Motion, captioned: CaptionedClip, *, mirror: bool = Tr
     if not mirror or any(ONE_SIDED.search(caption) for caption in captioned.captions):
         return [plain]
     captions = tuple(mirror_text(caption) for caption in captioned.captions)
-    return [
-        plain,
-        Example("M" + plain.name, captions, hml.mirror(plain.features), plain.shown, plain.looped),
-    ]
+    mirrored = replace(plain, name="M" + plain.name, captions=captions)
+    return [plain, replace(mirrored, features=hml.mirror(plain.features))]
 
 
 def uniform_positions(motion: Motion) -> Array:
@@ -167,9 +165,9 @@ def _example(motion: Motion, captioned: CaptionedClip) -> Example:
     positions = uniform_positions(motion)[: MOST_FRAMES + 1]
     name = captioned.path.stem
     count = len(positions) - 1
-    if count >= LENGTH:
-        return Example(name, captioned.captions, hml.encode(positions, heading="corrected"), (0, count))
     features = hml.encode(positions, heading="corrected")
+    if count >= LENGTH:
+        return Example(name, captioned.captions, features, (0, count))
     looped = augment.loop(features, LENGTH) if _goes_on(positions) else None
     if looped is not None:
         return Example(name, captioned.captions, looped, (0, len(looped)), looped=True)
@@ -220,10 +218,10 @@ def check_clip(motion: Motion) -> list[Finding]:
     """
     leg = read_body(motion.skeleton).leg
     own = joints22(motion)
-    found = [*_of_size(leg, motion.seconds)]
-    if not found:
-        found = [*_of_movement(uniform_positions(motion), own / max(leg, 1e-9) * 0.85, motion.fps), *_of_floor(own)]
-    return sorted(found, key=lambda one: not one.fatal)
+    findings = [*_of_size(leg, motion.seconds)]
+    if not findings:
+        findings = [*_of_movement(uniform_positions(motion), own / max(leg, 1e-9) * 0.85, motion.fps), *_of_floor(own)]
+    return sorted(findings, key=lambda one: not one.fatal)
 
 
 def check_file(motion_or_error: Motion | MotionloomError) -> list[Finding]:
@@ -255,24 +253,24 @@ def _of_movement(uniform: Array, own: Array, fps: float) -> Iterator[Finding]:
     speed = np.linalg.norm(np.diff(own[:, 0], axis=0), axis=-1) * fps
     if len(speed) and speed.max() > LEAP:
         leap, second = speed.max() / fps, int(speed.argmax()) / fps
-        said = f"the body leaps {leap:.2f} m from one frame to the next at {second:.2f} s; cut the clip there"
-        yield Finding(said, fatal=True)
+        text = f"the body leaps {leap:.2f} m from one frame to the next at {second:.2f} s; cut the clip there"
+        yield Finding(text, fatal=True)
     trunk = uniform[:, 12] - uniform[:, 0]
     rise = trunk[:, 1] / np.maximum(np.linalg.norm(trunk, axis=-1), 1e-9)
     if np.percentile(rise, 90) <= 0.3:
-        said = "the body lies or hangs all the time; if it should stand, the file has another axis up (--up z)"
-        yield Finding(said, fatal=False)
+        text = "the body lies or hangs all the time; if it should stand, the file has another axis up (--up z)"
+        yield Finding(text, fatal=False)
     lowest = uniform[..., 1].min(axis=1)
     share = float((lowest - np.percentile(lowest, 1) > OVER_FLOOR).mean())
     if share > SHARE_IN_AIR:
-        said = f"it floats: for {100 * share:.0f} % of the time no part of the body is within {100 * OVER_FLOOR:.0f} cm"
-        said += " of the floor; the floor is not level, or what is climbed on is missing"
-        yield Finding(said, fatal=False)
+        text = f"it floats: for {100 * share:.0f} % of the time no part of the body is within {100 * OVER_FLOOR:.0f} cm"
+        text += " of the floor; the floor is not level, or what is climbed on is missing"
+        yield Finding(text, fatal=False)
     skate = ph.foot_skate(uniform, FPS, floor=ph.floor_height(uniform))
     if skate.ratio > SLIDES:
         often = f"{100 * skate.ratio:.0f} % of the frames"
-        said = f"feet slide on the floor in {often}, and that is learned too; lock them first"
-        yield Finding(said, fatal=False)
+        text = f"feet slide on the floor in {often}, and that is learned too; lock them first"
+        yield Finding(text, fatal=False)
 
 
 def _of_floor(own: Array) -> Iterator[Finding]:

@@ -1,7 +1,7 @@
 """The gate of a built set: a clip that does not show its recording stays outside, or has a reason to come in.
 
 Of every take that was compared, ``fidelity/NAME`` of the set holds the figures (`retarget.fidelity`), whatever became
-of it; `summary` puts them together by source for ``set.json``.
+of it; `summary` collects them by source for ``set.json``.
 """
 
 import json
@@ -48,9 +48,9 @@ class Compared:
 
 def fidelity_of(places: Places, clip: Clip) -> Fidelity:
     """How truly a built clip, whole and not mirrored, shows its recording."""
-    built = clip.positions()
-    own = hml.resample_positions(places.own, places.fps)[: len(built)]
-    return compare(own, built)
+    positions = clip.positions()
+    own = hml.resample_positions(places.own, places.fps)[: len(positions)]
+    return compare(own, positions)
 
 
 def admit(out: Path, take: str, places: Places, clip: Clip, *, allowed: str = "") -> None:
@@ -62,13 +62,13 @@ def admit(out: Path, take: str, places: Places, clip: Clip, *, allowed: str = ""
 
     Raises `MotionloomError` for a clip that is off and not allowed.
     """
-    seen = fidelity_of(places, clip)
-    faults = tuple(seen.faults())
+    fidelity = fidelity_of(places, clip)
+    faults = tuple(fidelity.faults())
     compared = Compared(
         source=clip.source,
-        directions=_pairs(seen.directions),
-        places=_pairs(seen.places),
-        by_leg=_pairs(seen.by_leg),
+        directions=_pairs(fidelity.directions),
+        places=_pairs(fidelity.places),
+        by_leg=_pairs(fidelity.by_leg),
         faults=faults,
         allowed=allowed if faults else "",
     )
@@ -107,8 +107,8 @@ def _read(path: Path) -> Compared:
         ) from None
 
 
-def _read_pairs(said: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:
-    return {str(name): (float(median), float(high)) for name, (median, high) in said.items()}
+def _read_pairs(rows: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:
+    return {str(name): (float(median), float(high)) for name, (median, high) in rows.items()}
 
 
 def refused(out: Path, take: str) -> bool:
@@ -148,11 +148,11 @@ def _together(parts: Sequence[dict[str, tuple[float, float]]]) -> dict[str, list
 def lines_of(about: Mapping[str, Any]) -> list[str]:
     """`summary` in words, a line for each source."""
     result = []
-    for source, seen in about.items():
-        line = f"{source}: {seen['clips']} clips like their recordings"
-        if seen["clips"]:
-            (median, high), place = seen["degrees"]["all"], seen["cm"]["all"][0]
+    for source, row in about.items():
+        line = f"{source}: {row['clips']} clips like their recordings"
+        if row["clips"]:
+            (median, high), place = row["degrees"]["all"], row["cm"]["all"][0]
             line += f", {median:g} degrees (95 %: {high:g}) and {place:g} cm off"
-        line += f", {seen['allowed']} of them allowed by name" if seen["allowed"] else ""
-        result.append(line + (f"; {seen['refused']} refused" if seen["refused"] else ""))
+        line += f", {row['allowed']} of them allowed by name" if row["allowed"] else ""
+        result.append(line + (f"; {row['refused']} refused" if row["refused"] else ""))
     return result

@@ -1,4 +1,4 @@
-"""A page of pictures to look over a built set: recordings beside the clips that were made of them."""
+"""A page of pictures to look over a built set: recordings beside the clips built from them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ from motionloom_train.data.sources import Places, Take, find_takes
 POSE = (92, 132)
 """Pixels of one pose."""
 MOMENTS = (0.15, 0.5, 0.85)
-"""Shares of a clip's time at which it is drawn."""
+"""Shares of a clip's time that the pictures show."""
 SIDE, FRONT = -np.pi / 2, 0.0
-"""Radians from where the person faces to where the camera stands."""
+"""Radians from where the person faces to where the camera is."""
 _CAPTION, _GAP = 20, 10
 _FAULT = (208, 62, 62)
 MOST = 20
@@ -44,7 +44,7 @@ class Pair:
 
     name: str
     recording: Array
-    built: Array
+    clip: Array
     remark: str
     sound: bool
 
@@ -64,8 +64,8 @@ def draw_look(
     not, at three moments from the side and from the front, on legs of one length.
 
     Args:
-        built_set: a folder that `data.build` made.
-        folders: the recordings that it was made of.
+        built_set: a folder of `data.build`.
+        folders: the recordings that it was built from.
         path: a name that ends in .png.
         each: clips of each source, 1 to 20.
         find: what finds the takes of a folder.
@@ -111,23 +111,23 @@ def choose(compared: Mapping[str, gate.Compared], each: int) -> list[str]:
 
 
 def _pair(built_set: Path, take: Take, compared: gate.Compared) -> Pair:
-    read: list[Places] = []
-    made = next(clips_of(take, check=lambda places, clip: read.append(places)))
-    kept = built_set / "clips" / f"{take.name}.safetensors"
-    clip = read_clip(kept) if kept.is_file() else made
-    built = clip.positions()
-    own = hml.resample_positions(read[0].own, read[0].fps)[: len(built)]
+    recordings: list[Places] = []
+    first = next(clips_of(take, check=lambda places, clip: recordings.append(places)))
+    path = built_set / "clips" / f"{take.name}.safetensors"
+    clip = read_clip(path) if path.is_file() else first
+    positions = clip.positions()
+    own = hml.resample_positions(recordings[0].own, recordings[0].fps)[: len(positions)]
     median, high = compared.directions["all"]
     verdict = "refused" if compared.refused else "allowed" if compared.allowed else ""
-    said = ": ".join(part for part in (verdict, ", ".join(compared.faults[:2])) if part)
-    remark = f"{take.source}, {median:.1f} degrees off (95 %: {high:.0f}){'; ' + said if said else ''}"
+    note = ": ".join(part for part in (verdict, ", ".join(compared.faults[:2])) if part)
+    remark = f"{take.source}, {median:.1f} degrees off (95 %: {high:.0f}){'; ' + note if note else ''}"
     leg = np.linalg.norm(own[:, [4, 7]] - own[:, [1, 4]], axis=-1).sum(axis=-1)
-    return Pair(take.name, own * (LEG / float(np.median(leg))), built, remark, not compared.faults)
+    return Pair(take.name, own * (LEG / float(np.median(leg))), positions, remark, not compared.faults)
 
 
 def _row(pair: Pair) -> Image.Image:
-    frames = [round(share * (len(pair.built) - 1)) for share in MOMENTS]
-    shapes = [figure(_motion(places)) for places in (pair.recording, pair.built)]
+    frames = [round(share * (len(pair.clip) - 1)) for share in MOMENTS]
+    shapes = [figure(_motion(places)) for places in (pair.recording, pair.clip)]
     span = 1.15 * max(_reach(shape, frames) for shape in shapes)
     poses = [_pose(shape, frame, span, azimuth) for shape in shapes for azimuth in (SIDE, FRONT) for frame in frames]
     half = POSE[0] * len(poses) // 2

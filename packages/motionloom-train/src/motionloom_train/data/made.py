@@ -1,8 +1,8 @@
-"""Gestures of the arms made on recorded bodies: what everyday sentences ask for and recordings lack.
+"""Gestures of the arms added to recorded bodies: what everyday sentences name and recordings lack.
 
 A gesture is a place for one wrist or both, with a swing about it (``gestures.toml``). The recorded person stands, sits
 or walks; the wrists go there and back by a smooth path, and the elbows follow in closed form (`limbs.bend`). Everything
-else of the recording stays. Clips made so are marked (``way`` ``made``) and used in training only.
+else of the recording stays. Such clips are marked (``way`` ``made``) and used in training only.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _MOVE = 0.5
 
 @dataclass(frozen=True)
 class Gesture:
-    """One entry of ``gestures.toml``, which says what each part means."""
+    """One entry of ``gestures.toml``, which explains each part."""
 
     name: str
     hands: str
@@ -59,8 +59,8 @@ GESTURES: dict[str, Gesture] = _read()
 def perform(body: Array, gesture: Gesture, side: str, *, fps: float, begin: float, rng: np.random.Generator) -> Array:
     """``body`` (frames, 22, 3) metres with the arms of a gesture; ``side``: the hand of a gesture of one hand.
 
-    The hands leave after ``begin`` seconds, and a swing has the same phase then: were it drawn, the average over what a
-    sentence may show would be a hand that is held still.
+    The hands leave after ``begin`` seconds, and a swing has the same phase then: were it random, the average over what
+    a sentence may show would be a hand that is held still.
     """
     result = body.copy()
     time = np.arange(len(body)) / fps - begin

@@ -56,7 +56,7 @@ class Pair:
     split: str
     """``train``, ``val`` or ``test``."""
     captions: tuple[str, ...]
-    """What both do together; empty where nobody said."""
+    """What both do together; empty where nobody described it."""
     source: str
     licence: str
     positions: Array
@@ -118,9 +118,9 @@ def _pack_pair(folder: Path, first: dict[str, str], second: dict[str, str]) -> P
         for row in (first, second)
     ]
     name = f"{first['clip']}+{second['clip']}"
-    said = first["description"]
-    known = next((texts for word, texts in _COUPLES.items() if word in said.lower()), ())
-    captions = known or ((f"two people together: {said}",) if said else ())
+    words = first["description"]
+    known = next((texts for word, texts in _COUPLES.items() if word in words.lower()), ())
+    captions = known or ((f"two people together: {words}",) if words else ())
     licence = first.get("licence") or (sources.CMU_LICENCE if first["source"] == "cmu" else sources.UNKNOWN_LICENCE)
     return Pair(name, first["split"], captions, first["source"], licence, together(motions[0], motions[1], name=name))
 
@@ -131,7 +131,7 @@ def _pack_pair(folder: Path, first: dict[str, str], second: dict[str, str]) -> P
 def read_pair_folder(folder: Path | str, *, captions: bool = True) -> list[Pair]:
     """A user's own pairs: ``NAME_a.bvh`` with ``NAME_b.bvh``, or ``NAME/a.bvh`` with ``NAME/b.bvh``.
 
-    ``captions.txt`` beside them says what happens: ``NAME: words`` or NAME, a tab and words on each line, any number
+    ``captions.txt`` beside them has the captions: ``NAME: words`` or NAME, a tab and words on each line, any number
     of lines for a name; blank lines and lines that begin with # are skipped. With ``captions`` every pair needs one;
     without it the file may be absent (completion needs no words). Of ten or more pairs in the order of their names the
     fifth of every ten is for validation and the tenth for test; fewer are all for training.
@@ -141,16 +141,16 @@ def read_pair_folder(folder: Path | str, *, captions: bool = True) -> list[Pair]
     """
     folder = Path(folder)
     files = _pair_files(folder)
-    said = _captions(folder, set(files), needed=captions)
+    texts = _captions(folder, set(files), needed=captions)
     splits = {4: "val", 9: "test"} if len(files) >= 10 else {}
     return [
-        _own_pair(name, files[name], splits.get(number % 10, "train"), said.get(name, ()))
+        _own_pair(name, files[name], splits.get(number % 10, "train"), texts.get(name, ()))
         for number, name in enumerate(sorted(files))
     ]
 
 
 def _pair_files(folder: Path) -> dict[str, tuple[Path, Path]]:
-    found: dict[str, dict[str, Path]] = {}
+    files: dict[str, dict[str, Path]] = {}
     for path in finished(folder, "*.bvh", "*/*.bvh"):
         if path.parent == folder and (match := re.fullmatch(r"(.+)_([ab])", path.stem)):
             name, person = match.groups()
@@ -158,21 +158,21 @@ def _pair_files(folder: Path) -> dict[str, tuple[Path, Path]]:
             name, person = path.parent.name, path.stem
         else:
             continue
-        if person in found.setdefault(name, {}):
+        if person in files.setdefault(name, {}):
             raise MotionloomError(
                 f"{folder} has the pair {name} twice, as {name}_{person}.bvh and {name}/{person}.bvh; keep one"
             )
-        found[name][person] = path
-    for people in found.values():
+        files[name][person] = path
+    for people in files.values():
         if len(people) == 1:
             ((person, path),) = people.items()
             other = path.with_name(path.name.removesuffix(f"{person}.bvh") + ("b" if person == "a" else "a") + ".bvh")
             raise MotionloomError(f"{path} has no partner: {other} is missing; add it or take {path.name} away")
-    if not found:
+    if not files:
         raise MotionloomError(
             f"{folder} has no pairs; name them NAME_a.bvh and NAME_b.bvh, or NAME/a.bvh and NAME/b.bvh"
         )
-    return {name: (people["a"], people["b"]) for name, people in found.items()}
+    return {name: (people["a"], people["b"]) for name, people in files.items()}
 
 
 def _captions(folder: Path, names: set[str], *, needed: bool) -> dict[str, tuple[str, ...]]:
@@ -184,16 +184,16 @@ def _captions(folder: Path, names: set[str], *, needed: bool) -> dict[str, tuple
             )
         return {}
     lines = read_utf8(path, max_bytes=_MAX_CAPTIONS, empty=True).splitlines()
-    said: dict[str, tuple[str, ...]] = {}
+    texts: dict[str, tuple[str, ...]] = {}
     for number, line in enumerate(lines, start=1):
         if line.strip() and not line.lstrip().startswith("#"):
             name, words = _caption(line, names, f"{path}, line {number}")
-            said[name] = (*said.get(name, ()), words)
-    silent = sorted(names - set(said))
+            texts[name] = (*texts.get(name, ()), words)
+    silent = sorted(names - set(texts))
     if silent:
         more = f" and {len(silent) - 1} more" if len(silent) > 1 else ""
         raise MotionloomError(f"{path} has no line for the pair {silent[0]}{more}; add '{silent[0]}: what they do'")
-    return said
+    return texts
 
 
 def _caption(line: str, names: set[str], place: str) -> tuple[str, str]:
@@ -203,7 +203,7 @@ def _caption(line: str, names: set[str], place: str) -> tuple[str, str]:
         raise MotionloomError(f"{place} has no caption: {line[:60]!r}; write 'NAME: what they do'")
     if len(words) > _LONGEST_CAPTION or not words.isprintable():
         raise MotionloomError(f"{place} has a caption that is no line of at most {_LONGEST_CAPTION} printable letters")
-    if name not in names:  # names are looked up only, so none leads anywhere
+    if name not in names:  # names are looked up only: none is used as a path
         has = ", ".join(sorted(names)[:3]) + (" and others" if len(names) > 3 else "")
         raise MotionloomError(f"{place} names {name[:60]!r}, which is no pair of that folder; it has {has}")
     return name, words

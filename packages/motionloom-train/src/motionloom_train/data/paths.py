@@ -16,7 +16,7 @@ DAMAGED = (
 
 
 def inside(folder: Path, relative: str) -> Path:
-    """``folder/relative``; raises MotionloomError where that leads out of the folder, or is no path at all."""
+    """``folder/relative``; raises MotionloomError where that is outside of the folder, or is no path at all."""
     try:
         path, base = (folder / relative).resolve(), folder.resolve()
         with suppress(FileNotFoundError, NotADirectoryError):

@@ -14,10 +14,9 @@ SUNK = 0.04
 def uniform_person(positions: Array, fps: float) -> Array:
     """Joints (frames, 22, 3) in metres, y up, at any rate, to those of the uniform person at 20 per second.
 
-    From the origin, facing +Z. The floor stays where planted feet say it is, or where a body lies that would be in it.
+    From the origin, facing +Z. The floor is under planted feet, or where a body lies that would be in it.
     """
-    person = hml.uniform(hml.resample_positions(positions, fps))
-    return at_origin(out_of_floor(person))
+    return at_origin(out_of_floor(hml.uniform(hml.resample_positions(positions, fps))))
 
 
 def at_origin(positions: Array) -> Array:

@@ -1,8 +1,8 @@
-"""Changes of the whole body made on people who stand: kneeling down, lunging, bending to the toes, ducking, swaying.
+"""Changes of the whole body added to people who stand: kneeling down, lunging, bending to the toes, ducking, swaying.
 
 Recordings under free licences hardly have them. A posture is a few key poses of pelvis, feet, trunk and hands; the
 body goes from one to the next by a smooth path, knees and elbows follow in closed form (`limbs.bend`), and what the
-recorded person does besides (breathing, small sways) goes on. Clips made so are marked (``kind`` is ``made``).
+recorded person does besides (breathing, small sways) goes on. Such clips are marked (``kind`` is ``made``).
 """
 
 from collections.abc import Iterator
@@ -57,7 +57,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Posture:
-    """What is made, and the action of ``actions.toml`` that it shows."""
+    """A change of the body, and the action of ``actions.toml`` that it shows."""
 
     action: str
     poses: tuple[Pose, ...]
@@ -66,9 +66,9 @@ class Posture:
     arms_out: bool = False
     """Both arms are spread meanwhile."""
 
-    def seconds(self, *, kept: float) -> float:
+    def seconds(self, *, stay: float) -> float:
         """How long it takes; a last pose that stays is kept for at most so long."""
-        return sum(pose.seconds + min(pose.stay, kept if pose is self.poses[-1] else pose.stay) for pose in self.poses)
+        return sum(pose.seconds + min(pose.stay, stay if pose is self.poses[-1] else pose.stay) for pose in self.poses)
 
 
 def postures(body: Array, rng: np.random.Generator) -> Iterator[Posture]:

@@ -131,18 +131,18 @@ def _read(
         if number % 50 == 0:
             say(f"reading recording {number + 1} of {len(takes)}")
         try:
-            read = take.read()
+            recording = take.read()
         except MotionloomError as error:
             say(f"left out {take.name}: {error}")
             continue
-        if isinstance(read, np.ndarray):
+        if isinstance(recording, np.ndarray):
             raise MotionloomError(f"{take.name} is kept as features; prediction needs recordings of joints")
-        positions = resample_positions(read.positions, read.fps, target=fps)
+        positions = resample_positions(recording.positions, recording.fps, target=fps)
         if not np.isfinite(positions).all():
             say(f"left out {take.name}: its positions are not finite")
             continue
-        said = take.spans[-1].texts[0] if take.spans and take.spans[-1].texts else "motion"
-        yield Recording(take.name, subject(take), said, split(take), positions.astype(np.float32))
+        action = take.spans[-1].texts[0] if take.spans and take.spans[-1].texts else "motion"
+        yield Recording(take.name, subject(take), action, split(take), positions.astype(np.float32))
 
 
 def checked(folder: Path | str, protocol: Protocol) -> Protocol:

@@ -1,4 +1,4 @@
-"""Who hears of progress."""
+"""How progress is reported."""
 
 from collections.abc import Callable
 
@@ -7,4 +7,4 @@ Say = Callable[[str], None]
 
 
 def silent(line: str) -> None:
-    """Say nothing."""
+    """Report nothing."""

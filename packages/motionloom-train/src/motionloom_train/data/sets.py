@@ -1,4 +1,4 @@
-"""A built set in memory: its clips end to end, and what is said of each stretch."""
+"""A built set in memory: its clips end to end, and the captions of each stretch."""
 
 import functools
 import re
@@ -17,7 +17,7 @@ from motionloom.io.text import parse_json, read_utf8
 from motionloom.reading import read_table
 from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
-from motionloom_train.data.clips import MADE, Clip, Note, read_clip
+from motionloom_train.data.clips import GESTURE, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
 from motionloom_train.data.words import EVENTS, STATES, phrases, sentence
 
@@ -32,14 +32,14 @@ def table() -> dict[str, dict[str, list[str]]]:
 
 
 def sayings(note: Note) -> tuple[str, ...]:
-    """The table's sentences for what a note says; none for captions, and for gestures of people who walk or sit."""
+    """The table's sentences for a note; none for captions, and for gestures of people who walk or sit."""
     name = note.kind.removeprefix(PREFIX)
     if not note.kind.startswith(PREFIX):
         return tuple(table().get(f"label:{name}", {}).get("says", ()))
-    made = name.startswith(MADE)
-    if made and any(re.search(r"\b(walk|sit)\w* and ", text) for text in note.texts):
+    gesture = name.startswith(GESTURE)
+    if gesture and any(re.search(r"\b(walk|sit)\w* and ", text) for text in note.texts):
         return ()
-    entry = table().get(f"gesture:{name.removeprefix(MADE)}" if made else f"action:{name}", {})
+    entry = table().get(f"gesture:{name.removeprefix(GESTURE)}" if gesture else f"action:{name}", {})
     side = side_of(note.texts)
     turns_right = name in ACTIONS and ACTIONS[name].turns and side == "right"
     plain = [] if turns_right else entry.get("says", [])
@@ -47,9 +47,9 @@ def sayings(note: Note) -> tuple[str, ...]:
 
 
 WORDINGS = 48
-"""Sentences made per measured label."""
+"""Sentences generated per measured label."""
 WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
-"""How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
+"""How often a stretch is sampled among those of its action: animated by hand it teaches what, not how."""
 
 STRIKES = {"kick": "foot", "punch": "hand"}
 """How the measured labels begin that name a strike, and the limb that strikes."""
@@ -70,9 +70,9 @@ class Item:
     texts: tuple[int, ...]
     """Numbers of its sentences in `MotionSet.texts`."""
     core: tuple[int, int] | None = None
-    """Frames of `MotionSet.features` (first, end) without which a window does not show what is said, such as a jump."""
+    """Frames of `MotionSet.features` (first, end) without which a window does not show the action, such as a jump."""
     weight: float = 1.0
-    """How often it is drawn among those of its group."""
+    """How often it is sampled among those of its group."""
     rests: tuple[int, ...] = ()
     """Frames of `MotionSet.features` at which a repetition of an exercise begins; windows begin there."""
 
@@ -89,7 +89,7 @@ class MotionSet:
     texts: tuple[str, ...]
     licences: tuple[str, ...]
     minutes: float
-    """Minutes of motion as recorded, without mirrored and made-up copies."""
+    """Minutes of motion as recorded, without mirrored and derived copies."""
 
 
 def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Sequence[str] = ("train",)) -> list[Clip]:
@@ -99,11 +99,11 @@ def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Seque
         raise MotionloomError(
             f"{folder} is not a built set (it has no set.json); make one with 'motionloom data build'"
         )
-    clips = (read_clip(path) for path in finished(folder / "clips", "*.safetensors"))
-    kept = [c for c in clips if c.split in splits and (not sources or c.source.startswith(tuple(sources)))]
-    if not kept:
+    every = (read_clip(path) for path in finished(folder / "clips", "*.safetensors"))
+    clips = [c for c in every if c.split in splits and (not sources or c.source.startswith(tuple(sources)))]
+    if not clips:
         raise MotionloomError(f"{folder} holds no clips of source {', '.join(sources) or 'any'} in {', '.join(splits)}")
-    return kept
+    return clips
 
 
 def statistics(clips: Sequence[Clip]) -> tuple[np.ndarray, np.ndarray]:
@@ -125,16 +125,16 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
     items, start = [], 0
     for clip in clips:
         for note in clip.notes:
-            said = _worded(note, texts, wordings, rng)
+            numbers = _worded(note, texts, wordings, rng)
             moments = _moments(clip, note)
             side = side_of([note.kind, *note.texts]) if "punch" in note.kind else ""
             for first, last in ((note.first, note.last), *moments):
                 core = note.core or ((first, last) if moments or _is_event(note) else None)
                 core, rests = _when(clip, note.kind, core, first, last, side)
-                kept = (start + core[0], start + core[1]) if core else None
+                span = (start + core[0], start + core[1]) if core else None
                 begins = tuple(start + rest for rest in rests)
                 items.append(
-                    Item(start + first, last - first, note.kind, said, kept, WEIGHT.get(clip.kind, 1.0), begins)
+                    Item(start + first, last - first, note.kind, numbers, span, WEIGHT.get(clip.kind, 1.0), begins)
                 )
         start += len(clip.features)
     features = torch.from_numpy(np.concatenate([c.features for c in clips]))
@@ -160,29 +160,29 @@ def _worded(
     if note.kind == "index":
         return tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
     if note.kind not in wordings:
-        made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
-        wordings[note.kind] = tuple(_number(texts, text) for text in (*sorted(made), *sayings(note)))
+        variants = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
+        wordings[note.kind] = tuple(_number(texts, text) for text in (*sorted(variants), *sayings(note)))
     return wordings[note.kind]
 
 
-def _of_its_side(note: Note, said: tuple[str, ...]) -> tuple[str, ...]:
-    """What is said of an action of one hand, one leg or to one side; of the left one only what names that side.
+def _of_its_side(note: Note, texts: tuple[str, ...]) -> tuple[str, ...]:
+    """The texts for an action of one hand, one leg or to one side; of the left one only what names that side.
 
     So "a person punches" means the right hand: the average of both would be a body that keeps its guard.
     """
     name = note.kind.removeprefix(PREFIX)
-    gesture = GESTURES.get(name.removeprefix(MADE))
+    gesture = GESTURES.get(name.removeprefix(GESTURE))
     action = ACTIONS.get(name)
     one = gesture.hands == "one" or bool(gesture.thrust[2]) if gesture else action and action.sided and not action.turns
     if not one or side_of(note.texts) != "left":
-        return said
-    return tuple(text for text in said if side_of([text]) == "left") or said
+        return texts
+    return tuple(text for text in texts if side_of([text]) == "left") or texts
 
 
 def _when(
     clip: Clip, kind: str, core: tuple[int, int] | None, first: int, last: int, side: str
 ) -> tuple[tuple[int, int] | None, list[int]]:
-    """The frames that a window must hold, drawn in to the strike where there is one; and where repetitions begin."""
+    """The frames that a window must hold, narrowed to the strike where there is one; and where repetitions begin."""
     action = ACTIONS.get(kind.removeprefix(PREFIX)) if kind.startswith(PREFIX) else None
     limb = action.limb if action else next((limb for word, limb in STRIKES.items() if kind.startswith(word)), "")
     repeats = action is not None and action.kind == "repeats"
@@ -202,12 +202,12 @@ def _is_event(note: Note) -> bool:
 def _moments(clip: Clip, note: Note) -> list[tuple[int, int]]:
     """At most `MOMENTS` windows within a captioned stretch that measurably show the event its caption names.
 
-    A caption for ten seconds says "kicks"; most crops of two or four seconds of it show somebody who stands there.
+    A caption for ten seconds says "kicks"; most crops of two or four seconds of it show somebody standing.
     """
     if note.kind not in ("human", "index"):
         return []
-    said = " ".join(note.texts).lower()
-    named = {label for label, words in EVENTS.items() if re.search(words, said)}
+    text = " ".join(note.texts).lower()
+    named = {label for label, words in EVENTS.items() if re.search(words, text)}
     spans = sorted(
         {
             (n.first, n.last)
@@ -227,7 +227,7 @@ def _number(texts: dict[str, int], text: str) -> int:
 
 
 def summary(folder: Path | str) -> dict:
-    """What ``set.json`` says; raises MotionloomError where there is none or it is damaged."""
+    """The content of ``set.json``; raises MotionloomError where there is none or it is damaged."""
     path = Path(folder) / "set.json"
     about = parse_json(read_utf8(path, max_bytes=_MAX_SUMMARY), path)
     if not isinstance(about, dict):

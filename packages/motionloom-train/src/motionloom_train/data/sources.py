@@ -40,7 +40,7 @@ _PACKED = 32
 
 @dataclass(frozen=True)
 class Span:
-    """A part of a take and what people say it shows."""
+    """A part of a take and its captions."""
 
     start_s: float
     end_s: float
@@ -51,8 +51,8 @@ class Span:
     def __post_init__(self) -> None:
         if not (0 <= self.start_s <= LATEST and self.end_s >= 0):  # also what is no number; the end may be infinity
             raise ValueError(f"a stretch goes from {self.start_s:g} to {self.end_s:g} seconds")
-        for said in self.texts:
-            check_caption(said)
+        for caption in self.texts:
+            check_caption(caption)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,27 +103,27 @@ def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> lis
 
 def _pack(folder: Path) -> Iterator[Take]:
     """A manifest.csv with one row per clip; captions/cmu.jsonl holds what people wrote about them, if it is there."""
-    written: dict[str, list[Span]] = {}
+    spans: dict[str, list[Span]] = {}
     captions = folder / "captions" / "cmu.jsonl"
     manifest = folder / "manifest.csv"
     try:
         for row in _json_lines(captions) if captions.is_file() else ():
             span = Span(float(row["start_s"]), float(row["end_s"]), tuple(map(str, row["captions"])), "human")
-            written.setdefault(row["clip"], []).append(span)
+            spans.setdefault(row["clip"], []).append(span)
     except DAMAGED as error:
         raise _unusable(captions, error, "mend it") from None
     try:
         lines = io.StringIO(text.read_utf8(manifest, max_bytes=MAX_MANIFEST, empty=True), newline="")
-        yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
+        yield from (_pack_take(folder, row, spans) for row in csv.DictReader(lines))
     except DAMAGED as error:
         raise _unusable(manifest, error, "mend it") from None
 
 
-def _pack_take(folder: Path, row: dict[str, str], written: dict[str, list[Span]]) -> Take:
+def _pack_take(folder: Path, row: dict[str, str], captions: dict[str, list[Span]]) -> Take:
     path, source = inside(folder, row["path"]), row["source"]
     if row["split"] not in ("train", "val", "test"):
         raise ValueError(f"split {row['split']!r} of {row['clip']} is not train, val or test")
-    spans = [] if source.startswith("bandai") else written.get(row["clip"], [])
+    spans = [] if source.startswith("bandai") else captions.get(row["clip"], [])
     index = describe_index(row["description"])
     if index and (not spans or source.startswith(("cmu", "bandai"))):  # a whole sentence is no entry of an index
         spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
@@ -177,10 +177,10 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
     """HumanML3D as its authors lay it out: new_joint_vecs/*.npy, texts/*.txt, train.txt, val.txt, test.txt."""
     for split, name in listed_names(folder, ("train", "val", "test")):
         if name.startswith("M"):
-            continue  # mirrored copies are made here
-        said = tuple(_texts(folder / "texts" / f"{name}.txt"))
+            continue  # mirrored copies are computed here
+        spans = tuple(_texts(folder / "texts" / f"{name}.txt"))
         read = partial(read_features, inside(folder, f"new_joint_vecs/{name}.npy"))
-        yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, said, read)
+        yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, spans, read)
 
 
 def listed_names(folder: Path, splits: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -190,17 +190,17 @@ def listed_names(folder: Path, splits: Sequence[str]) -> Iterator[tuple[str, str
     Raises `MotionloomError` for a list that is missing or holds what is no name, and for a clip that is listed twice:
     it would count twice, or be trained on and tested with.
     """
-    seen: dict[str, Path] = {}
+    lists: dict[str, Path] = {}
     for split in splits:
-        listed = folder / f"{split}.txt"
-        if not listed.is_file():
-            raise MotionloomError(f"{listed} is missing; a HumanML3D folder has train.txt, val.txt and test.txt")
-        for name in text.read_utf8(listed, max_bytes=_MAX_LIST, empty=True).split():
+        path = folder / f"{split}.txt"
+        if not path.is_file():
+            raise MotionloomError(f"{path} is missing; a HumanML3D folder has train.txt, val.txt and test.txt")
+        for name in text.read_utf8(path, max_bytes=_MAX_LIST, empty=True).split():
             if not re.fullmatch(r"[\w.-]{1,80}", name):
-                raise MotionloomError(f"{listed} lists {name[:40]!r}, which is not a name; mend it")
-            if name in seen:
-                raise MotionloomError(f"{listed} lists {name}, which {seen[name].name} has listed already; mend them")
-            seen[name] = listed
+                raise MotionloomError(f"{path} lists {name[:40]!r}, which is not a name; mend it")
+            if name in lists:
+                raise MotionloomError(f"{path} lists {name}, which {lists[name].name} has listed already; mend them")
+            lists[name] = path
             yield split, name
 
 
@@ -230,27 +230,27 @@ def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[]
 
 def read_features(path: Path) -> np.ndarray:
     """An array of features (frames, 263), as float32; raises MotionloomError for any other, and for NaN in it."""
-    found = read_array(path)
-    if found.ndim != 2 or found.shape[1] != WIDTH or found.dtype.kind != "f" or not np.isfinite(found).all():
+    array = read_array(path)
+    if array.ndim != 2 or array.shape[1] != WIDTH or array.dtype.kind != "f" or not np.isfinite(array).all():
         raise MotionloomError(
-            f"{path} is not an array of finite features (frames, {WIDTH}), but {found.dtype} of the shape "
-            f"{found.shape}; fetch it again"
+            f"{path} is not an array of finite features (frames, {WIDTH}), but {array.dtype} of the shape "
+            f"{array.shape}; fetch it again"
         )
-    return np.array(found, dtype=np.float32)
+    return np.array(array, dtype=np.float32)
 
 
 def _json_lines(path: Path) -> Iterator[dict]:
     if not path.is_file():
         raise MotionloomError(f"there is no caption file {path}")
     packed = path.suffix == ".gz"
-    left = max(_MAX_LIST, _PACKED * path.stat().st_size if packed else text.MAX_BYTES)
+    room = max(_MAX_LIST, _PACKED * path.stat().st_size if packed else text.MAX_BYTES)
     try:
         with gzip.open(path, "rb") if packed else path.open("rb") as lines:
             number = 0
             while line := lines.readline(_MAX_LINE):
                 number += 1
-                left -= len(line)
-                if left < 0 or len(line) == _MAX_LINE:
+                room -= len(line)
+                if room < 0 or len(line) == _MAX_LINE:
                     raise MotionloomError(f"{path} has a line of 1 MB or more, or unfolds far beyond its size")
                 yield text.parse_json(line, f"{path}, line {number}")
     except (OSError, EOFError, zlib.error) as error:  # damaged, cut short
@@ -258,7 +258,7 @@ def _json_lines(path: Path) -> Iterator[dict]:
 
 
 def _unusable(path: Path | None, error: Exception, advice: str) -> MotionloomError:
-    """What is wrong with a row, in one short sentence; an error that says so already stays what it is."""
+    """What is wrong with a row, in one short sentence; an error of ours is returned as it is."""
     if isinstance(error, MotionloomError):
         return error
     reason = " ".join(str(error).split())  # of bytes that are no text the repr would hold them all

@@ -1,8 +1,8 @@
 """What a few seconds of motion measurably show, as labels of `data.words.LABELS`.
 
 Captions of whole clips say little about the five seconds a network sees: a clip called "walk, 90-degree left turn" may
-show a straight walk. These rules read displacement, heading, heights and swings, and for gestures also ask that the
-clip's own text names the action. They describe training windows only and share no thresholds with
+show a straight walk. These rules read displacement, heading, heights and swings, and for gestures also need the
+action in the clip's own text. They describe training windows only and share no thresholds with
 `lab.metrics.obedience`, which judges what comes out.
 """
 
@@ -134,7 +134,7 @@ def _swings(signal: Array, amplitude: float) -> int:
 
 
 class Rule(NamedTuple):
-    """What a window is called where its clip's words and its own measures say so."""
+    """The labels of a window whose clip's words and own measures fulfil conditions."""
 
     labels: str
     """The names it gets, with commas; none where a window like this has no name."""
@@ -168,7 +168,7 @@ def _comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], 
 
 
 def _rules(rows: Sequence[Mapping[str, Any]]) -> tuple[Rule, ...]:
-    """Rules of ``windows.toml``, with what their names stand for."""
+    """Rules of ``windows.toml``, with their names replaced by what they mean."""
     named = _ROWS["words"] | _ROWS["measures"]
 
     def whole(value: Any) -> Any:
@@ -208,13 +208,13 @@ def _first(rules: Sequence[Rule], compared: Measures, words: str) -> list[str]:
 
 
 def _every(rules: Sequence[Rule], compared: Measures, words: str) -> list[str]:
-    found: list[str] = []
+    labels: list[str] = []
     closed: set[str] = set()
     for rule in rules:
         if rule.choice not in closed and rule.holds(compared, words):
-            found += rule.labels.split(",")
+            labels += rule.labels.split(",")
             closed |= {rule.choice, *rule.closes} - {""}
-    return found
+    return labels
 
 
 LENGTHS = (2.5, 4.0, 6.0)

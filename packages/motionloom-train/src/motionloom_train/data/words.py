@@ -41,7 +41,7 @@ def mirror_text(text: str) -> str:
 
 
 _WORDS = read_table("motionloom_train.data", "phrases.toml")
-LABELS: dict[str, tuple[str, ...]] = {label: tuple(said) for label, said in _WORDS["labels"].items()}
+LABELS: dict[str, tuple[str, ...]] = {label: tuple(verbs) for label, verbs in _WORDS["labels"].items()}
 """Verb phrases for what a window measurably shows; see `data.windows`."""
 _PEOPLE: list[str] = _WORDS["people"]
 STATES, POSTURES = tuple(_WORDS["states"]), tuple(_WORDS["postures"])
@@ -101,12 +101,12 @@ _NO_VERBS = {"arms", "forwards", "hands", "knees", "legs", "sideways"}
 
 
 def describe_index(description: str) -> tuple[str, ...]:
-    """Verb phrases in everyday words for a description of the pack's index; empty where there is nothing to say."""
+    """Verb phrases in everyday words for a description of the pack's index; empty where none is known."""
     lowered = description.lower()
-    found = next((tuple(said) for key, said in _WORDS["index"].items() if key in lowered), ())
+    verbs = next((tuple(row) for key, row in _WORDS["index"].items() if key in lowered), ())
     styles = _WORDS["styles"].items()
     style = next((word for key, word in styles if f"{key} style" in lowered or f"({key})" in lowered), None)
-    return found if style is None else (*found, *(f"{phrase} {style}" for phrase in found))
+    return verbs if style is None else (*verbs, *(f"{phrase} {style}" for phrase in verbs))
 
 
 def phrases(label: str) -> Sequence[str]:

@@ -3,7 +3,7 @@
 Both people go through the same frozen network. After some of its layers the block sees what became of the one and of
 the other, and corrects the one; the roles exchanged, with the same weights, it corrects the other. A state has one slot
 before the frames, whose first four numbers are the person's part of D: their relative ground pose at frame 0
-(`features.pair.PlaceCode`). So D is drawn along with the motion, and whatever holds, guides or edits rows of a state
+(`features.pair.PlaceCode`). So D is sampled along with the motion, and whatever holds, guides or edits rows of a state
 (guidance, inpainting, `observe`) does it here too.
 
     net(state (2 * pairs, 1 + frames, numbers), level, bound) -> the same; rows a0, b0, a1, b1, ...
@@ -36,7 +36,7 @@ _FAR = 5.0
 
 
 def fitting(prior: NetConfig, *, layers: int = 1, split: int | None = None, aware: bool = False) -> PairConfig:
-    """The settings of a new block for a prior: after its last layer, unless ``split`` says otherwise, as wide as it.
+    """The settings of a new block for a prior: after its last layer, unless ``split`` is another, as wide as it.
 
     (Table 3 of the paper: higher layers do better, and one layer does better than two or four.)
     """
@@ -48,7 +48,7 @@ def fitting(prior: NetConfig, *, layers: int = 1, split: int | None = None, awar
 class Talk(nn.Module):
     """The communication block: the weights that are trained, and nothing else.
 
-    Fresh it says nothing: the correction is 0, so both priors are what they were, and the estimate of D is 0.
+    Untrained it changes nothing: the correction is 0, so both priors are what they were, and the estimate of D is 0.
     """
 
     def __init__(self, config: PairConfig, prior: NetConfig) -> None:
@@ -173,7 +173,7 @@ class PairNet(nn.Module):
     def _other_seen(
         self, inner: Inner, bound: Bound, places: Tensor, signal: Tensor, valid: Tensor | None, frames: int
     ) -> Tensor:
-        """(rows, tokens, patch * 13): where the other stands, faces, and has head and wrists, as the person sees it.
+        """(rows, tokens, patch * 13): where the other is, faces, and has head and wrists, as the person sees it.
 
         By what the two priors alone estimate and by the D of the state, trusted as far as its noise lets one; numbers
         of a person in metres, `PlaceCode` mutual.

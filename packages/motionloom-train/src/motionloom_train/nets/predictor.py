@@ -34,18 +34,18 @@ class TransLinear(nn.Module):
     def forward(self, x: Tensor, t: Tensor, condition: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
         style = self.time_embed(waves(t, self.config.width).to(x))
         if condition is not None:
-            asked = self.cond_embed(condition.flatten(1))
-            style = style + (asked if keep is None else asked * keep[:, None])
+            embedding = self.cond_embed(condition.flatten(1))
+            style = style + (embedding if keep is None else embedding * keep[:, None])
         if self.config.beside:
             x = torch.cat([x, self._beside(x, condition, keep)], dim=-1)
         h = self.joint_embed(x) + self.sequence_embedding
-        half, given = self.config.layers // 2, []
+        half, skips = self.config.layers // 2, []
         for number, block in enumerate(self.temporal_decoder_blocks):
             if number < half:
-                given.append(h)
+                skips.append(h)
                 h = block(h, style)
             else:
-                h = block(h, style) + given.pop()
+                h = block(h, style) + skips.pop()
         return self.out(h)
 
     def _beside(self, x: Tensor, condition: Tensor | None, keep: Tensor | None) -> Tensor:

@@ -8,8 +8,8 @@ checkpoints load.
 of "turn left" and "turn right" nearly coincide; the noise level and the pooled text shift and scale every block
 (adaptive layer norm after Peebles & Xie 2023, with one shared projection as in Chen et al. 2024).
 
-Both: ``net(state, level, bound)`` with ``bound = net.bind(condition)`` made once per sample, before the loop, so that
-everything that depends on the text alone (projections, keys, values) is computed once.
+Both: ``net(state, level, bound)`` with ``bound = net.bind(condition)`` computed once per sample, before the loop, so
+that everything that depends on the text alone (projections, keys, values) is computed once.
 """
 
 import math
@@ -25,7 +25,7 @@ from motionloom.runtime.sizes import NetConfig as NetConfig
 
 
 class Condition(NamedTuple):
-    """What a motion is asked to be, one entry per row. Zeros in place of a text mean: no text."""
+    """What a motion should be, one entry per row. Zeros in place of a text mean: no text."""
 
     pooled: Tensor
     """(rows, text) one vector per text."""
@@ -73,7 +73,7 @@ def condition(
 
 
 class Bound(NamedTuple):
-    """A condition as the network's layers want it; rows stay the first axis of every part."""
+    """A condition as the network's layers read it; rows stay the first axis of every part."""
 
     text: Tensor
     """(rows, width) projected pooled text."""
@@ -255,7 +255,7 @@ class PriorNet(nn.Module):
         places = torch.arange(tokens.shape[1], device=tokens.device) * self.config.patch
         times = sinusoids(places, width).to(tokens.dtype)
         clock = tokens.new_zeros(rows, 0)
-        if self.modulated and self.config.clock:  # what a text asks for at a time, on a way that carries no noise
+        if self.modulated and self.config.clock:  # what a text requests at a time, on a path without noise
             clock = self.clock(F.silu(both[:, None] + self.place(times)))
         return Inner(self.drop(tokens + times), both, mask, change, last, clock)
 

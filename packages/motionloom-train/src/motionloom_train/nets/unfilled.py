@@ -10,7 +10,7 @@ from torch.overrides import TorchFunctionMode
 
 @contextmanager
 def unfilled() -> Iterator[None]:
-    """Modules that are made inside lie on the device ``meta``: they hold no memory, and nothing is drawn at random.
+    """Modules constructed inside are on the device ``meta``: they hold no memory, and no random numbers are generated.
 
     Drawing is skipped rather than done on ``meta``, where its first use builds tables of decompositions.
     """

@@ -17,9 +17,9 @@ def chosen(captions: list[str], entries: int) -> list[str]:
 
 
 def test_pieces_of_the_captions_specials_and_single_characters_are_always_kept() -> None:
-    kept = chosen(["an unaffable person"], 0)
+    pieces = chosen(["an unaffable person"], 0)
     singles = [piece for piece in VOCABULARY if len(piece.removeprefix("##")) == 1]
-    assert set(kept) == {*SPECIALS, *singles, "un", "##aff", "##able", "person"}
+    assert set(pieces) == {*SPECIALS, *singles, "un", "##aff", "##able", "person"}
 
 
 def test_the_rest_is_filled_in_the_order_of_the_vocabulary() -> None:

@@ -71,13 +71,13 @@ def leg_raise(body: Body, side: int) -> Measures:
     """``height``: leg lengths the wanted ankle is above the other at the most, in front of the body with the knee bent
     by less than 50 degrees. ``other``: the same of the other one. ``speed``: m/s of that ankle against the body,
     95th percentile: a leg that is raised is no kick."""
-    found = []
+    heights = []
     for foot in (side, 1 - side):
         height = (body.ankles[:, foot] - body.ankles[:, 1 - foot]) / body.leg
         good = (body.knees[:, foot] < 50) & (body.own[:, ANKLES[foot], 2] > 0.15)
-        found.append(float(np.where(good, height, 0.0).max()))
+        heights.append(float(np.where(good, height, 0.0).max()))
     speed = ph.smooth(g.limb_speed(body.p, body.fps, (ANKLES[side],)), 3)
-    return {"height": found[0], "other": found[1], "speed": float(np.percentile(speed, 95))}
+    return {"height": heights[0], "other": heights[1], "speed": float(np.percentile(speed, 95))}
 
 
 def knee_raise(body: Body, side: int) -> Measures:

@@ -43,10 +43,10 @@ def carries(body: Body) -> Measures:
     hands = body.hands
     apart = np.linalg.norm(hands[:, 0] - hands[:, 1], axis=-1)
     level = (body.reach_up < 0.1) & (body.p[:, (20, 21), 1] > body.p[:, :1, 1] - 0.15)
-    kept = ((hands[..., 2] > 0.12) & level).all(axis=1) & (apart > 0.15) & (apart < 1.0)
+    held = ((hands[..., 2] > 0.12) & level).all(axis=1) & (apart > 0.15) & (apart < 1.0)
     gap = hands[:, 0, 2] - hands[:, 1, 2]
     return {
-        "hands_kept": float(kept.mean()),
+        "hands_kept": float(held.mean()),
         "swing": float(np.percentile(gap, 90) - np.percentile(gap, 10)),
     }
 

@@ -1,4 +1,4 @@
-"""Two or three actions in a row: each is looked for in its own time, in the order that was asked."""
+"""Two or three actions in a row: each is looked for in its own time, in the order of the prompt."""
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def stands_then_walks(body: Body) -> Measures:
 def walks_then_waves(body: Body) -> Measures:
     """Split where the way is done: when 90 % of it lies behind. ``walked``: metres gone forward before. ``swings``: to
     and fro of 4 cm or more of a raised hand after. ``drift``: metres gone after."""
-    before, after = body.split(_done(body, 0.9))
+    before, after = body.split(_frame_at(body, 0.9))
     swings = waves(after, 0)
     return {"walked": before.advance, "swings": max(swings["swings"], swings["other"]), "drift": after.travel}
 
@@ -66,7 +66,7 @@ def kick_then_punch(body: Body) -> Measures:
     """``kick``: leg lengths of the better kick's height. ``speed``: m/s of that foot. ``thrust``: m/s of the faster
     fist from 0.2 s after the foot is highest on."""
     sides = [kicks(body, side) for side in (0, 1)]
-    side = int(np.argmax([found["height"] for found in sides]))
+    side = int(np.argmax([kick["height"] for kick in sides]))
     ankles = body.ankles[:, side] - body.ankles[:, 1 - side]
     thrust = g.wrist_thrust(body.p, body.fps).max(axis=1)
     at = min(int(np.argmax(ankles)) + round(0.2 * body.fps), len(thrust) - 1)
@@ -95,6 +95,6 @@ def jump_then_walk(body: Body) -> Measures:
     return {"rise": jumps[0].rise, "clearance": jumps[0].clearance, "walked": after.advance}
 
 
-def _done(body: Body, share: float) -> int:
+def _frame_at(body: Body, share: float) -> int:
     way = np.cumsum(body.pace)
     return int(np.searchsorted(way, share * way[-1]))
