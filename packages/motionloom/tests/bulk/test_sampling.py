@@ -64,5 +64,5 @@ def test_the_shipped_prior_makes_the_same_positions_in_any_company() -> None:
     alone = places([1], [100])[0]
     for rows, lengths in (([1, 0], [100, 97]), ([3, 2, 1, 0, 0], [98, 99, 100, 100, 97])):
         assert np.abs(places(rows, lengths)[rows.index(1)] - alone).max() < 3e-6
-    by_itself = generate(prior, PROMPTS[1], seconds=5.0, seed=1, steps=4, literal=True)[0].positions()
+    by_itself = generate(prior, PROMPTS[1], seconds=5.0, seed=1, steps=4, as_one=True)[0].positions()
     assert np.abs(by_itself - alone).max() < 2e-5

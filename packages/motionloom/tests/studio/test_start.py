@@ -12,7 +12,7 @@ LEFT_SHOULDER, RIGHT_SHOULDER, LEFT_WRIST, RIGHT_WRIST, HEAD = 16, 17, 20, 21, 1
 DEEDS = {
     "a person walks, turns around and waves": ("walks", "turns 1"),
     "a person walks forward, then sits down": ("walks", "ends sitting"),
-    "a person picks something up off the floor and walks on": ("squats once", "walks"),
+    "a person picks something up off the floor and walks on": ("bows once", "walks"),
     "a child skips along happily": ("hops on one leg", "forward"),
     "a person is doing jumping jacks": ("does jumping jacks",),
     "a person claps their hands": ("claps",),
