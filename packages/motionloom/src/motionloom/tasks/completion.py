@@ -353,10 +353,14 @@ class WindowSampler:
         lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -MOST_SUNK)  # who is lower already stays there
         under = (lowest[:, None] - positions[..., 1].min(axis=-1)).clip(0)
         ease = max(round(RISE * self.predictor.fps), 1)
-        rising = smoothstep(np.arange(1, positions.shape[1] + 1) / (2 * ease))
-        lift = envelope(under, ease // 2) * rising
+        lift = envelope(under, ease // 2) * _ramp(positions.shape[1], 2 * ease)
         positions = positions + lift[..., None, None] * [0, 1, 0]
         return positions if self.root else positions + (person[:, -1:, :1] - positions[:, :, :1]) * [1, 0, 1]
+
+
+def _ramp(frames: int, ease: int) -> Array:
+    """(frames,) from 0 behind the past to 1 within ``ease`` frames."""
+    return smoothstep(np.arange(1, frames + 1) / ease)
 
 
 def window_count(predictor: Predictor, seconds: float) -> int:
