@@ -10,6 +10,7 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks import worded
 from motionloom.tasks.text import generate
+from motionloom.tasks.watching import watching
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 
@@ -107,6 +108,23 @@ def test_what_is_not_shown_is_generated_again(prior: Prior, monkeypatch: pytest.
     assert line.startswith("not found in 4 attempts: a wave")
     (third,) = generate(prior, ACTIONS[1], seconds=1.0, steps=2, seed=seeds[5], as_one=True)
     np.testing.assert_allclose(motions[1].motion.positions(), third.positions(), atol=1e-5)
+
+
+def test_who_watches_sees_the_first_attempts_and_goes_on_watching(
+    prior: Prior, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also between two motions that are read: a generator shares its reader's context."""
+    seen: list[int] = []
+    monkeypatch.setattr(worded, "missing", lambda *_: ["a wave"])
+    timelines = [worded.read(prior, text, 1.0) for text in ACTIONS]
+    with watching(lambda denoised: seen.append(denoised.move)):
+        motions = worded.generate_timelines(prior, timelines, seeds=[0, 1, 2], sampling=Sampling(steps=2))
+        next(motions)
+        assert seen == [1, 2]
+        generate(prior, "a person sits", seconds=1.0, steps=2, literal=True)
+        assert seen == [1, 2, 1, 2]
+        assert len(list(motions)) == 2
+    assert seen == [1, 2, 1, 2]
 
 
 def test_a_sentence_as_one_keeps_the_first_motion(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:

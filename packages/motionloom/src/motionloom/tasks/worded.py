@@ -9,7 +9,6 @@ at most. The result is the one with the least missing.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -265,20 +264,25 @@ def _best_attempts(
             progress=later if number else first,
         )
         again = set(unseen)
-        with watching(lambda denoised: None) if number else nullcontext():  # what is watched is the first attempt
-            for place, motion in sampled:
-                i = unseen[place]
-                attempt = Worded(motion, timelines[i], (), attempts)
-                if i not in best or len(attempt.missing) < len(best[i].missing):
-                    best[i] = attempt
-                if number + 1 == attempts or not best[i].missing:
-                    again.remove(i)
-                while finished in best and finished not in again:
-                    yield best.pop(finished)
-                    finished += 1
+        for place, motion in _unwatched(sampled) if number else sampled:
+            i = unseen[place]
+            attempt = Worded(motion, timelines[i], (), attempts)
+            if i not in best or len(attempt.missing) < len(best[i].missing):
+                best[i] = attempt
+            if number + 1 == attempts or not best[i].missing:
+                again.remove(i)
+            while finished in best and finished not in again:
+                yield best.pop(finished)
+                finished += 1
         unseen = sorted(again)
         if not unseen:
             return
+
+
+def _unwatched(sampled: Iterator[tuple[int, Motion]]) -> list[tuple[int, Motion]]:
+    """All of them, sampled unseen by who is watching: what is watched is the first attempt."""
+    with watching(lambda denoised: None):
+        return list(sampled)
 
 
 def _once_at_its_end(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
