@@ -109,6 +109,7 @@ def test_a_project_file_is_saved_and_opened(studio: Studio, tmp_path: Path):
     studio.key("Control+z")
     assert len(studio.blocks()) == 1
     studio.page.locator("input[type=file]").set_input_files(str(file))
+    studio.page.locator(".track.words .block").nth(1).wait_for()  # the page reads a file in its own time
     assert len(studio.blocks()) == 2
 
 
