@@ -9,7 +9,7 @@ export interface GenerateRequest {
   readonly levels?: boolean | number;
   /** what the person does, such as 'a person walks' */
   readonly prompt: string;
-  /** length of each motion: 5, on stairs 4, or of several actions in a sentence what they take, in seconds */
+  /** length of each motion: as long as its actions take people; what can go on, such as walking, 5, in seconds */
   readonly seconds?: number;
   /** one motion of the whole sentence, 'A, then B' too; numbers are not read */
   readonly as_one?: boolean;

@@ -163,5 +163,5 @@ def test_actions_in_a_row_are_parted_unless_they_are_left_whole(
     assert main([*line, "--seconds", "5"]) == 0
     assert len(io.load("a.npz")) == 100
     assert main([*line, "--as-one"]) == 0
-    assert len(io.load("a.npz")) == 100
+    assert len(io.load("a.npz")) == 140
     assert main([*line, "--solver", "ddim"]) == 2

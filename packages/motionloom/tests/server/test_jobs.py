@@ -76,7 +76,7 @@ def test_numbers_in_the_words_are_kept_and_measured_as_on_the_command_line(serve
     status, stored = server.json("GET", f"/motions/{result['id']}")
     assert (status, stored["about"]["happened"]) == (200, [did])
     literal = server.draw(task="generate", prompt="turn left 90 degrees", seed=5, steps=6, literal=True)
-    assert literal["results"][0]["frames"] == 100
+    assert literal["results"][0]["frames"] == 60
 
 
 def test_words_that_nobody_learned_are_remarked_on(server: Server) -> None:

@@ -28,6 +28,7 @@ from motionloom.cli.skeletons import Target
 from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
 from motionloom.goals.remarks import numbers_read, parts_read
+from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.io.text import read_text
 from motionloom.kinematics.gestures import Seat, seats
@@ -36,7 +37,6 @@ from motionloom.kinematics.stairs import stairs
 from motionloom.motion import Motion
 from motionloom.requests.sampling import SOLVER
 from motionloom.requests.tasks import Generate
-from motionloom.requests.timeline import usual_seconds
 from motionloom.tasks.run import Models, Plan, run_each
 from motionloom.tasks.worded import Worded
 from motionloom.weights.prior import Prior

@@ -44,17 +44,34 @@ class Part:
 
 _SECONDS = {
     "locomotion": 4.0,
-    "gesture": 3.0,
+    "gesture": 4.0,
     "state": 3.0,
     "change": 3.0,
     "event": 2.5,
     "jump": 2.5,
-    "turn": 2.5,
+    "turn": 3.0,
     "fight": 3.0,
     "dance": 5.0,
     "other": 4.0,
 }
 """Kinds of verbs, and the seconds such an action takes."""
+_GOES_ON, WHOLE = ("locomotion", "state", "dance"), 5.0
+"""What can go on, and what is repeated, does so for `WHOLE` seconds where it is the whole sentence."""
+_REPEATS = re.compile(
+    r"\b(?:jumping jacks|(?:push|sit|pull)-?ups|up and down|back and forth|to and fro|side to side|again and again"
+    r"|repeatedly|keeps?)\b",
+    re.IGNORECASE,
+)
+_STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
+_ON_STAIRS = 4.0
+"""People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
+_DOWN = (
+    (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
+    (re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
+)
+"""Ways to the floor take longer than other changes."""
+MOST_AT_ONCE = 9.8
+"""The longest motion of the recordings that the weights were trained on."""
 
 _THEN = re.compile(
     r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this"
@@ -193,8 +210,10 @@ def natural_seconds(text: str) -> float:
     words = text.lower()
     if (explicit := read_seconds(text)) is not None:
         return max(explicit, SHORTEST)
-    kind = next((kind_of_verb(word, words) for word in re.findall(r"[a-z]+", words) if base_of(word)), "other")
+    kind = _kind(words)
     seconds = _SECONDS[kind]
+    if kind in ("change", "event"):
+        seconds = next((longer for pattern, longer in _DOWN if pattern.search(words)), seconds)
     if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
         seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
     elif match := re.search(r"\b(\d+|[a-z]+) times\b", words):
@@ -209,7 +228,26 @@ def natural_seconds(text: str) -> float:
         seconds *= 1.3
     elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", words):
         seconds *= 0.8
-    return float(min(max(seconds, SHORTEST), LONGEST))
+    return round(min(max(seconds, SHORTEST), LONGEST), 2)
+
+
+def usual_seconds(text: str) -> float:
+    """Seconds of a whole sentence without a length: what it takes people (`natural_seconds`), or all of its actions.
+
+    What can go on or is repeated (walking, dancing, standing, jumping jacks) goes on for 5 s, on stairs 4 s; several
+    actions take `MOST_AT_ONCE` at most.
+    """
+    parts = split_actions(text)
+    if len(parts) > 1:
+        return min(sum(part.seconds for part in parts), MOST_AT_ONCE)
+    if read_seconds(text) is None and (_kind(text.lower()) in _GOES_ON or _REPEATS.search(text)):
+        return _ON_STAIRS if _STAIRS.search(text) else max(natural_seconds(text), WHOLE)
+    return natural_seconds(text)
+
+
+def _kind(words: str) -> str:
+    """The kind of the first verb in words of small letters."""
+    return next((kind_of_verb(word, words) for word in re.findall(r"[a-z]+", words) if base_of(word)), "other")
 
 
 def _part_seconds(part: str) -> float:

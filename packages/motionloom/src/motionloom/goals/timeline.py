@@ -27,13 +27,13 @@ from motionloom.goals.fields import Field, LinedFile
 from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.segment import TRANSITION, Segment
-from motionloom.goals.sequence import Part, lengths, split_actions
+from motionloom.goals.sequence import Part, lengths, split_actions, usual_seconds
 from motionloom.goals.verbs import subject_of
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
 from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
-from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys, usual_seconds
+from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
 
 TIMELINE, SEGMENT = specs(TimelineKeys), specs(SegmentKeys)
 SHORTEST = SEGMENT["seconds"].low

@@ -20,7 +20,7 @@ class Generate(Finish, Adapted):
 
     prompt: str = prompt(needed=True)
     seconds: float | None = seconds(
-        "length of each motion: 5, on stairs 4, or of several actions in a sentence what they take"
+        "length of each motion: as long as its actions take people; what can go on, such as walking, 5"
     )
     as_one: bool = declare("flag", "one motion of the whole sentence, 'A, then B' too; numbers are not read", False)
     literal: bool = declare(

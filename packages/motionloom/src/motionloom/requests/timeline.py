@@ -1,6 +1,5 @@
 """What a timeline file may hold: segments that follow each other, and what is said of all of them."""
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +9,6 @@ from motionloom.requests.shared import LONGEST, prompt
 
 SECONDS = 5.0
 """Of a segment where nothing is said."""
-STAIRS, CLIMBED = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE), 4.0
-
-
-def usual_seconds(text: str) -> float:
-    """Seconds of a sentence without a length: `SECONDS`; on stairs as long as people were recorded there.
-
-    The recordings that go up for longer climb ladders, and so would somebody on stairs.
-    """
-    return CLIMBED if STAIRS.search(text) else SECONDS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from motionloom.errors import MotionloomError, listed, meant, quoted
 from motionloom.goals.adapters import Applied, parse_adapter
 from motionloom.goals.fields import Field
+from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline, timeline_of
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.reading import read, resolve_sampling
 from motionloom.requests.tasks import REQUESTS
-from motionloom.requests.timeline import SECONDS, usual_seconds
+from motionloom.requests.timeline import SECONDS
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.timelines import timeline_from_json

@@ -87,7 +87,7 @@ def generate(
         prior: the weights, from `Prior.load`.
         prompts: what the person does, one text or several.
         seconds: length, one for all or one per prompt, at the prior's frame rate (20 per second; BABEL's 30); None:
-            what numbers in the words need, or 5 (on stairs 4).
+            what numbers in the words need, or as long as the actions take people (`goals.sequence.usual_seconds`).
         literal: the words as they are. Otherwise numbers in them ("3 meters", "turns left 90 degrees", "jumps twice")
             are kept, and what they say plainly (a turn to the left, a wave) is looked for in the motion: where it is
             missing, up to three more are generated from seeds that depend on the motion's own, and the best is kept.

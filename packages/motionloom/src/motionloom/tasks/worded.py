@@ -23,12 +23,12 @@ from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
 from motionloom.goals.expected import missing
 from motionloom.goals.remarks import numbers_read, parts_read, remarks_on
+from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED, SOLVER, Sampling, Settings
-from motionloom.requests.timeline import usual_seconds
 from motionloom.tasks.control import control
 from motionloom.tasks.long import compose
 from motionloom.tasks.sampling import Progress
