@@ -65,11 +65,12 @@ _REPEATS = re.compile(
 _STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
 _ON_STAIRS = 4.0
 """People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
-_DOWN = (
+_LONGER = (
     (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
     (re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
+    (re.compile(r"\bturn(?:s|ed|ing)? (?:\w+ )?(?:around|round|about|back)\b"), 3.0),
 )
-"""Ways to the floor take longer than other changes."""
+"""What takes longer than others of its kind."""
 MOST_AT_ONCE = 9.8
 """The longest motion of the recordings that the weights were trained on."""
 
@@ -213,7 +214,7 @@ def natural_seconds(text: str) -> float:
     kind = _kind(words)
     seconds = _SECONDS[kind]
     if kind in ("change", "event"):
-        seconds = next((longer for pattern, longer in _DOWN if pattern.search(words)), seconds)
+        seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
     if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
         seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
     elif match := re.search(r"\b(\d+|[a-z]+) times\b", words):
