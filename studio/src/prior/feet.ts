@@ -28,6 +28,10 @@ const LOW = [0.11, 0.05, 0.11, 0.05] as const;
 /** Metres per second: what starts a contact, what keeps it, and what a foot said to be planted may have. */
 const [SLOW, STILL_SLOW, TOLD_SLOW] = [0.35, 0.5, 0.6] as const;
 const DRIFT = 0.12;
+/** How far a foot may turn while it stands flat, and how far it turns in one step if it turns further. */
+const [TURNS, STEP] = [(35 * Math.PI) / 180, (45 * Math.PI) / 180] as const;
+/** Seconds that such a step takes, and metres that the foot is lifted in the middle of it. */
+const [SWING, LIFT] = [0.3, 0.05] as const;
 const SUNK = 0.002;
 /** Metres: somebody whose toes rest this near to the floor rests on it, and who is three times as far does not. */
 const NEAR = 0.01;
@@ -46,7 +50,8 @@ export function cleanFeet(body: Body, contacts: Contacts): Body {
   const { fps } = body;
   if (body.root.length < 4) return body;
   const places = placesOf(body);
-  const planted = plantedFeet(places, fps, contacts);
+  const standing = standingFeet(places, fps, contacts);
+  const planted = inSteps(places, standing, fps);
   const level = toeLevel(places, fps);
   const height = level - clip(level, -NEAR, NEAR) * clip((3 * NEAR - Math.abs(level)) / (2 * NEAR), 0, 1);
   const feet = [0, 1].map((side) => {
@@ -66,7 +71,8 @@ export function cleanFeet(body: Body, contacts: Contacts): Body {
       flags,
       fps,
     );
-    let targets = places.map((at, f) => add(at[ankle]!, moved[f]!));
+    const lifts = liftsOf(standing.map((row, f) => [0, 1].some((k) => row[2 * side + k]) && !flags[f]!.some(Boolean)));
+    let targets = places.map((at, f) => add(add(at[ankle]!, moved[f]!), [0, lifts[f]!, 0]));
     const stretched = envelope(
       targets.map((at, f) => overreach(LIMBS[side]!, places[f]!, at)),
       rounded(LIFT_EASE * fps),
@@ -84,8 +90,13 @@ export function cleanFeet(body: Body, contacts: Contacts): Body {
   return withLegs(body, lowered, feet);
 }
 
-/** Four flags a frame: low, slow, said to be planted, and long enough to be a step. */
+/** Four flags a frame: low, slow, said to be planted, long enough to be a step, and no step of a turn. */
 export function plantedFeet(places: readonly Vec[][], fps: number, contacts: Contacts): boolean[][] {
+  return inSteps(places, standingFeet(places, fps, contacts), fps);
+}
+
+/** The same, of which some turn. */
+function standingFeet(places: readonly Vec[][], fps: number, contacts: Contacts): boolean[][] {
   const speed = speedOfFeet(places, fps);
   const height = places.map((at) => FEET.map((joint) => at[joint]![1]));
   const level = toeLevel(places, fps);
@@ -103,6 +114,44 @@ export function plantedFeet(places: readonly Vec[][], fps: number, contacts: Con
       for (let f = start; f < stop; f += 1) result[f]![k] = stop - start >= least;
   }
   return result;
+}
+
+/** Flags without those of flat feet that turn: a step at a time, the foot of that side first. */
+function inSteps(places: readonly Vec[][], standing: readonly (readonly boolean[])[], fps: number): boolean[][] {
+  const result = standing.map((row) => [...row]);
+  const half = Math.max(1, rounded((SWING * fps) / 2));
+  for (const side of [0, 1]) {
+    const [ankle, toe] = [FEET[2 * side]!, FEET[2 * side + 1]!];
+    for (const [start, stop] of spans(standing.map((row) => row[2 * side]! && row[2 * side + 1]!))) {
+      const feet = places.slice(start, stop).map((at) => minus(at[toe]!, at[ankle]!));
+      const [way, turned] = [[Math.atan2(feet[0]![0], feet[0]![2])], [0]];
+      for (const [x, , z] of feet.slice(1)) {
+        const more = Math.atan2(x, z) - way.at(-1)!;
+        const near = more - 2 * Math.PI * Math.round(more / (2 * Math.PI));
+        way.push(way.at(-1)! + near);
+        turned.push(turned.at(-1)! + Math.abs(near));
+      }
+      const wide = Math.max(...way) - Math.min(...way);
+      if (wide < TURNS) continue;
+      const steps = Math.max(1, rounded(wide / STEP));
+      const first = way.at(-1)! > way[0]! === (side === 0) ? 0.25 : 0.75;
+      for (let k = 0; k < steps; k += 1) {
+        const middle = start + turned.findIndex((sum) => sum >= (turned.at(-1)! * (k + first)) / steps);
+        for (let f = Math.max(middle - half, 0); f < Math.min(middle + half, result.length); f += 1)
+          result[f]![2 * side] = result[f]![2 * side + 1] = false;
+      }
+    }
+  }
+  return result;
+}
+
+/** Metres that a foot is lifted while it makes the steps of a turn. */
+function liftsOf(swings: readonly boolean[]): number[] {
+  const lifts = swings.map(() => 0);
+  for (const [start, stop] of spans(swings))
+    for (let f = start; f < stop; f += 1)
+      lifts[f] = LIFT * Math.sin((Math.PI * (f - start + 1)) / (stop - start + 1)) ** 2;
+  return lifts;
 }
 
 /** Height at which toes rest; that of the lowest where none do. */

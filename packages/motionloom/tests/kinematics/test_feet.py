@@ -100,6 +100,32 @@ def test_a_foot_that_comes_down_with_the_first_new_frame_stands_from_there() -> 
         assert np.ptp(places[:, [0, 2]], axis=0).max() < 0.01
 
 
+@pytest.mark.parametrize("degrees", [90, -90, 180, 30])
+def test_who_turns_like_a_figure_on_a_turntable_steps_around(degrees: float) -> None:
+    """The feet turn with the body, one after the other, and stand still on the floor in between."""
+    turn = np.radians(degrees) * np.clip((np.arange(80) - 15) / 50, 0, 1)
+    rotations = np.tile(rot.IDENTITY, (80, 22, 1))
+    rotations[:, 0] = rot.rotvec_to_quat(turn[:, None] * [0.0, 1.0, 0.0])
+    turning = Motion(SMPL22, FPS, np.zeros((80, 3)), rotations)
+    turning = replace(turning, root=-turning.positions()[:, [10, 11], 1].min() * np.array([[0.0, 1.0, 0.0]] * 80))
+    cleaned = clean_feet(turning).positions()
+    directions = cleaned[:, FEET[1::2]] - cleaned[:, FEET[::2]]
+    ways = np.degrees(np.unwrap(np.arctan2(directions[..., 0], directions[..., 2]), axis=0))
+    stepping = cleaned[:, FEET[1::2], 1] > 0.02
+    if abs(degrees) == 30:
+        assert not stepping.any(), "so far a body turns over feet that stand"
+        return
+    assert ways[-1] - ways[0] == pytest.approx([degrees, degrees], abs=15)
+    assert np.abs(ways - ways[0] - np.degrees(turn)[:, None]).max() < 40
+    assert stepping.any(axis=0).all()
+    assert not stepping.all(axis=1).any(), "one foot stands at any time"
+    first, second = (int(np.flatnonzero(one)[0]) for one in stepping.T)
+    assert (first < second) == (degrees > 0), "the foot of the side that is turned to goes first"
+    resting = cleaned[:, FEET[1::2], 1] < 0.001
+    steps = np.linalg.norm(np.diff(cleaned[:, FEET[1::2]], axis=0)[..., [0, 2]], axis=-1)
+    assert steps[resting[1:] & resting[:-1]].max() < 0.005
+
+
 def test_feet_come_out_of_the_floor() -> None:
     motion = slider(sink=0.04)
     assert depth(motion) > 0.03

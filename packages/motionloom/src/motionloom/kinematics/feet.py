@@ -34,6 +34,10 @@ _SLOW, _STILL_SLOW, _CONTACT_SLOW = 0.35, 0.5, 0.6
 """Metres per second: what starts a contact, what keeps it, and what a foot said to be planted may have."""
 _DRIFT = 0.12
 """Metres: a planted foot that strays further from the middle of its stance means to move; the stance is split."""
+_TURNS, _STEP = np.radians(35), np.radians(45)
+"""How far a foot may turn while it stands flat, and how far it turns in one step if it turns further."""
+_SWING, _LIFT = 0.3, 0.05
+"""Seconds that such a step takes, and metres that the foot is lifted in the middle of it."""
 _SUNK = 0.002
 """Metres under the floor that are left, as in recordings: lifting every millimetre would leave people afloat."""
 _NEAR = 0.01
@@ -62,7 +66,8 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
     if len(motion) < 4:
         return motion
     places, fps = motion.positions(), motion.fps
-    planted = planted_feet(places, fps, contacts=contacts)
+    standing = _standing_feet(places, fps, contacts)
+    planted = _in_steps(places, standing, fps, shown)
     level = toe_level(places, fps) - floor
     height = floor + level - np.clip(level, -_NEAR, _NEAR) * np.clip((3 * _NEAR - abs(level)) / (2 * _NEAR), 0, 1)
     targets, directions = places[:, [limb.end for limb in LIMBS[:2]]].copy(), np.empty((len(motion), 2, 3))
@@ -78,6 +83,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         ends = places[since:, ankle] - [0, height, 0]
         moved = correction(ends, ends + tip[since:], flags[since:], fps, held=shown > 0, level=True)
         targets[since:, i] += moved
+        targets[:, i, 1] += free * _lifts(standing[:, 2 * i : 2 * i + 2].any(1) & ~flags.any(1))
         stretched = envelope(_overreach(places, targets, i), round(_LIFT_EASE * fps))
         targets[since:, i, 1] += np.minimum(stretched[since:], -np.minimum(moved[:, 1], 0))
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
@@ -91,8 +97,14 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
 def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | None = None) -> Flags:
     """(frames, 4) flags for left ankle, left foot, right ankle, right foot: low, slow, and long enough to be a step.
 
-    ``positions`` (frames, 22, 3) metres; ``contacts`` as for `clean_feet` replaces the strict test of speed.
+    ``positions`` (frames, 22, 3) metres; ``contacts`` as for `clean_feet` replaces the strict test of speed. A foot
+    that turns while it stands flat does so in steps: it does not stand while it makes one.
     """
+    return _in_steps(positions, _standing_feet(positions, fps, contacts), fps)
+
+
+def _standing_feet(positions: np.ndarray, fps: float, contacts: np.ndarray | None) -> Flags:
+    """`planted_feet`, of which some turn."""
     feet = np.asarray(positions)[:, list(FEET)]
     speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * fps
     low = feet[..., 1] < toe_level(positions, fps) + _LOW
@@ -107,6 +119,35 @@ def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | No
         runs = [run for run in true_spans(may[:, k]) if sure[slice(*run), k].any()]
         for start, stop in _joined(runs, gap):
             result[start:stop, k] = stop - start >= least
+    return result
+
+
+def _in_steps(positions: np.ndarray, standing: Flags, fps: float, shown: int = 0) -> Flags:
+    """Flags (frames, 4) without those of feet that turn: `_STEP` at a time, the foot of that side first.
+
+    Networks turn people like a figure on a turntable. Frames before ``shown`` stay.
+    """
+    result, half = standing.copy(), max(1, round(_SWING * fps / 2))
+    for i in (0, 1):
+        foot = np.asarray(positions)[:, FEET[2 * i + 1]] - np.asarray(positions)[:, FEET[2 * i]]
+        for start, stop in true_spans(standing[:, 2 * i : 2 * i + 2].all(1)):
+            way = np.unwrap(np.arctan2(foot[start:stop, 0], foot[start:stop, 2]))
+            if np.ptp(way) < _TURNS:
+                continue
+            turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(way)))])
+            steps = max(1, round(float(np.ptp(way) / _STEP)))
+            first = 0.25 if (way[-1] > way[0]) == (i == 0) else 0.75
+            for k in range(steps):
+                middle = start + int(np.searchsorted(turned, turned[-1] * (k + first) / steps))
+                result[max(middle - half, shown) : max(middle + half, shown), 2 * i : 2 * i + 2] = False
+    return result
+
+
+def _lifts(swings: Flags) -> Array:
+    """(frames,) metres that a foot is lifted while it makes the steps of a turn."""
+    result = np.zeros(len(swings))
+    for start, stop in true_spans(swings):
+        result[start:stop] = _LIFT * np.sin(np.pi * (np.arange(stop - start) + 1) / (stop - start + 1)) ** 2
     return result
 
 
