@@ -20,8 +20,9 @@ from motionloom.goals.sequence import split_actions, usual_seconds
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.physics import Array, smooth, velocity
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior
+from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.obedience import EVERYDAY
+from motionloom_lab.suites.harness import weight_marks
 from motionloom_lab.suites.items import real_clips
 from motionloom_lab.suites.trial import text_of, trials
 
@@ -92,7 +93,8 @@ def main() -> None:
         f"\nat rest where recordings are known ({len(known)} sentences): recordings {known[:, 5].mean():.1%}, "
         f"at 5 s {known[:, 1].mean():.1%}, usual {known[:, 3].mean():.1%}"
     )
-    print(f"Weights: {arguments.weights} {prior.mark}")
+    [(name, mark)] = weight_marks([find_weights(arguments.weights)]).items()
+    print(f"\nWeights: {name} {mark}")
 
 
 if __name__ == "__main__":

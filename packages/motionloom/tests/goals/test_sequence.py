@@ -104,6 +104,7 @@ WHOLES = [
     "a guard who walks and stops is bored",
     "somebody takes a run-up and leaps",
     "the woman bends down and grabs a coin off the floor",
+    "a man stumbles and falls forward",
     "bend over with straight legs and reach your fingers down to your feet",
     "a person stands next to a wall",
     "she walks slowly before the judges sit down",

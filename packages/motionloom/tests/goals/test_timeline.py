@@ -413,6 +413,8 @@ def test_numbers_beyond_all_bounds_are_refused_wherever_they_are(tmp_path):
         ("a man lies down", 6.0),
         ("a person is lying on the ground", 5.0),
         ("she turns around to face the other way", 3.0),
+        ("a man stumbles and falls forward", 3.5),
+        ("loses his balance and falls over", 3.5),
         ("a man trips over a stone", 3.5),
         ("he walks for three seconds", 3.0),
         ("a person sits down for 20 seconds", 20.0),

@@ -67,7 +67,7 @@ _ON_STAIRS = 4.0
 """People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
 _LONGER = (
     (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
-    (re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
+    (_FALLS := re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
     (re.compile(r"\bturn(?:s|ed|ing)? (?:\w+ )?(?:around|round|about|back)\b"), 3.0),
 )
 """What takes longer than others of its kind."""
@@ -213,7 +213,7 @@ def natural_seconds(text: str) -> float:
         return max(explicit, SHORTEST)
     kind = _kind(words)
     seconds = _SECONDS[kind]
-    if kind in ("change", "event"):
+    if kind in ("change", "event") or _FALLS.search(words):  # "stumbles and falls"
         seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
     if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
         seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
@@ -241,7 +241,8 @@ def usual_seconds(text: str) -> float:
     parts = split_actions(text)
     if len(parts) > 1:
         return min(sum(part.seconds for part in parts), MOST_AT_ONCE)
-    if read_seconds(text) is None and (_kind(text.lower()) in _GOES_ON or _REPEATS.search(text)):
+    goes_on = _kind(text.lower()) in _GOES_ON and not _FALLS.search(text.lower())
+    if read_seconds(text) is None and (goes_on or _REPEATS.search(text)):
         return _ON_STAIRS if _STAIRS.search(text) else max(natural_seconds(text), WHOLE)
     return natural_seconds(text)
 
@@ -329,8 +330,9 @@ def _split_list(clause: str) -> list[str]:
     kinds = kind_of(items[0], mood), kind_of(items[1], mood)
     counted = "gesture" not in kinds and any(read_amount(item) for item in items)
     waits = kinds[0] == "state" and bool(_WAITS.match(items[1]))  # "stands there and waits"
-    bends = verb_of(items[0], mood) in _BENDS and verb_of(items[1], mood) in _GRASPS and not comma
-    return items if comma or counted or (_follows(*kinds) and not waits and not bends) else [clause]
+    verbs = verb_of(items[0], mood), verb_of(items[1], mood)
+    together = not comma and any(verbs[0] in first and verbs[1] in second for first, second in _TOGETHER)
+    return items if comma or counted or (_follows(*kinds) and not waits and not together) else [clause]
 
 
 def _follows(first: str, second: str) -> bool:
@@ -410,11 +412,14 @@ _STAYS = re.compile(
     r"|holds? (?:it|that|this|still|(?:the|this|that) po(?:se|sition))",
     re.IGNORECASE,
 )
-_BENDS, _GRASPS = (
-    ("bend", "stoop", "crouch", "lean"),
-    ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
+_TOGETHER = (
+    (
+        ("bend", "stoop", "crouch", "lean"),
+        ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
+    ),
+    (("stumble", "trip", "slip", "stagger", "lose"), ("fall", "crash", "collapse", "tumble", "land")),
 )
-"""Somebody bends and grasps at once."""
+"""Somebody bends and grasps, stumbles and falls at once."""
 _WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
 """Who stays somewhere after these stands still, which is an action of its own."""
 _UP_AGAIN = re.compile(
