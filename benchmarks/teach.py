@@ -6,6 +6,7 @@ PACK is a folder with a manifest.csv, as `motionloom data build` reads it. For e
 first three clips; its prompts are drawn on seeds that no training used, before and after, and judged by a physical
 check. So that a check means something it is also tried on all clips of the packs, those of the action and the others.
 With --old the twenty prompts of `motionloom evaluate obedience` are drawn before and after too: what was known stays.
+With --taught FOLDER the adapters of an earlier run, its OUT, are judged again.
 
 OUT gets NAME.safetensors, NAME.png (the first draws, before and after) and teach.json.
 """
@@ -32,6 +33,7 @@ from motionloom.motion import Motion
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
 from motionloom.viz.video import draw_sheet
+from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
 from motionloom_lab.suites import obey
 from motionloom_lab.suites.harness import Run
@@ -236,7 +238,10 @@ def measure(action: Action, rows: list[dict[str, Any]], prior: Prior, arguments:
     before, first = obeyed(prior, action, arguments.seeds)
     began = time.perf_counter()
     settings = {"steps": arguments.steps} if arguments.steps else {}
-    adapter = teach(prior, examples, Lesson(name=action.name, licence="only to measure", **settings), say=print)
+    if arguments.taught:
+        adapter = Adapter.load(arguments.taught / f"{action.name}.safetensors", prior)
+    else:
+        adapter = teach(prior, examples, Lesson(name=action.name, licence="only to measure", **settings), say=print)
     seconds = time.perf_counter() - began
     place = adapter.save(arguments.out / f"{action.name}.safetensors")
     taught = adapt(prior, [(adapter, 1.0)])
@@ -268,6 +273,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--steps", type=int, help="training steps (default: those of the command)")
     parser.add_argument("--old", type=int, default=0, metavar="SEEDS", help="draw the twenty old prompts too")
+    parser.add_argument("--taught", type=Path, metavar="FOLDER", help="judge the adapters of an earlier run")
     parser.add_argument("--threads", type=int)
     arguments = parser.parse_args()
     wanted = [a for a in ACTIONS if not arguments.only or a.name in arguments.only.split(",")]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
+from motionloom.requests.sampling import Sampling
 from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors
 from motionloom.tasks.long import load_segment_adapters, long_features
 from motionloom.tasks.text import sample_features
@@ -123,6 +124,28 @@ def test_how_many_rows_go_together_changes_nothing(prior: Prior) -> None:
     segments = [replace(WALK, adapters=((adapter(prior, seed=i % 3), 1.0),) if i % 3 else ()) for i in range(5)]
     together, apart = (np.concatenate(features(prior, segments, batch_size=count)) for count in (8, 1))
     np.testing.assert_allclose(together, apart, rtol=0, atol=2e-4)
+
+
+def test_words_that_an_adapter_was_taught_are_guided_less(prior: Prior) -> None:
+    """The estimate without words does not know them; other words, and those of half an adapter, are guided as ever."""
+    taught = replace(adapter(prior), notes={"captions": ["a person turns the left wrist", "somebody nods"]})
+    prompts = ["a person turns the left wrist", "he nods", "a person walks"]
+    shares = adapt(prior, [(taught, 1.0)]).guided_shares(prompts)
+    assert shares.tolist() == pytest.approx([0.1, 0.1, 1.0])
+    assert adapt(prior, [(taught, 0.7)]).guided_shares(prompts).tolist() == [1.0, 1.0, 1.0]
+    assert prior.guided_shares(prompts).tolist() == [1.0, 1.0, 1.0]
+    words, whole, plain = prompts[0], adapt(prior, [(taught, 1.0)]), adapt(prior, [(replace(taught, notes={}), 1.0)])
+
+    def sampled(prior: Prior, *texts: str, guidance: float = 2.5) -> np.ndarray:
+        how = Sampling(guidance=guidance, steps=3, spacing="index")
+        return np.stack(sample_features(prior, list(texts), [40] * len(texts), seeds=range(len(texts)), sampling=how))
+
+    eased = sampled(whole, words)
+    np.testing.assert_allclose(eased, sampled(plain, words, guidance=1.15), rtol=0, atol=1e-4)
+    assert np.abs(eased - sampled(plain, words)).max() > 1e-3
+    np.testing.assert_allclose(sampled(whole, words, prompts[2])[0], eased[0], rtol=0, atol=2e-4)
+    segments = [replace(WALK, text=words)]
+    assert np.abs(features(whole, segments)[0] - features(plain, segments)[0]).max() > 1e-3
 
 
 def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> None:

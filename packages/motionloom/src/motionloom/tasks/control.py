@@ -23,7 +23,7 @@ from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.sampling import Batch, Progress, Rows, sample
+from motionloom.tasks.sampling import Batch, Progress, Rows, sample, strength
 from motionloom.tasks.text import check_goal_length, check_prompts, single_person_view, to_motion
 from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.adapter import adapters as shipped
@@ -144,7 +144,13 @@ def steered_features(
     def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
         if not nets:
             return corrected(denoise, [change] * len(batch.rows))
-        net = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.strength(prior.schedule))
+        net = partial(
+            blended,
+            nets,
+            batch.cond,
+            weights=weights,
+            guidance=strength(prior, chosen, [prompts[row] for row in batch.rows]),
+        )
         return _conditioned(net, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)

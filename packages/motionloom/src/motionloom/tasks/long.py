@@ -11,6 +11,7 @@ The published procedure and that of the paper are in `lab.papers.double_take`; d
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from typing import Unpack
 
@@ -33,7 +34,7 @@ from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.adapting import adapted_priors, load_adapters
 from motionloom.tasks.body import Places, solve_stream
-from motionloom.tasks.sampling import Moves, Network, sample_chain
+from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
 from motionloom.tasks.text import check_humanml
 from motionloom.tasks.watching import ChainView
@@ -240,9 +241,15 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], sampling: Sampling, pa
         if segment.goal and not segment.goal.empty:
             edits.append(toward(segment.goal, prior, first=before + lead))
         scale = sampling.strength(prior.schedule, segment.guidance)
+        if own.taught:
+            scale = partial(_eased_strength, scale, own.guided_shares([segment.text]))
         correct = _chain_corrections(edits)
         yield Row(segment.text, frames, before, after, overlap, scale, bound, null, correct, own.net)
         before, segment, number, lead = overlap // 2, following, number + 1, 0
+
+
+def _eased_strength(scale: Callable[[int], float], share: np.ndarray, level: int) -> float:
+    return float(eased(scale(level), share)[0])
 
 
 def load_segment_adapters(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:

@@ -17,6 +17,7 @@ from motionloom.diffusion import (
     Link,
     NoiseSource,
     State,
+    Weight,
     guide,
     inpaint,
     observe,
@@ -148,7 +149,7 @@ def sample(
         batch = Batch(numbers, prior.condition(list(some.prompts), padded), list(some.seeds))
         cond = batch.cond
         noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
-        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), sampling.strength(prior.schedule))
+        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), strength(prior, sampling, some.prompts))
         denoise, constrain = _identity_when_clean(base), None
         if observed is None:
             state = noise(np.empty((len(numbers), max(lengths), len(prior.mean)), np.float32))
@@ -175,6 +176,20 @@ def sample(
             frames = prior.smoothed(state[:, rows.slots :])
             state = denoise(np.concatenate([state[:, : rows.slots], frames], axis=1), 0)
         yield from ((number, one[:length]) for number, one, length in zip(numbers, state, lengths, strict=True))
+
+
+def strength(prior: Prior, sampling: Sampling, prompts: Sequence[str]) -> Weight:
+    """The guidance of each prompt by noise level, less of it for what adapters were taught in these words."""
+    scale = sampling.strength(prior.schedule)
+    if not prior.taught:
+        return scale
+    shares = prior.guided_shares(prompts)
+    return lambda level: eased(scale(level), shares)
+
+
+def eased(scale: float, shares: np.ndarray) -> np.ndarray:
+    """A guidance scale of which shares (rows,) of what it adds to 1 remain; scales up to 1 stay."""
+    return scale - (1 - shares) * max(scale - 1, 0.0)
 
 
 def _identity_when_clean(denoise: Denoiser) -> Denoiser:

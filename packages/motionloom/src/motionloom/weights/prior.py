@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from safetensors import SafetensorError, safe_open
 
+from motionloom.arrays import unit
 from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import check_head
@@ -23,7 +24,7 @@ from motionloom.runtime.prior_condition import Condition, condition
 from motionloom.runtime.session import find_device
 from motionloom.runtime.shapes import prior_shapes
 from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.known import Known, add_sentences, pack_known, unpack_known
+from motionloom.runtime.text.known import Known, add_sentences, bare, pack_known, unpack_known
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.runtime.text.published import TEXTS, PublishedText
@@ -73,6 +74,12 @@ def parse_schedule(about: dict[str, Any]) -> Schedule:
     return SCHEDULES[name](levels)
 
 
+UNLIKE, ALIKE = 0.8, 0.95
+"""Cosines to a taught caption up to which a prompt is guided as ever, and from which it is that caption."""
+HALF_TAUGHT, LEAST_GUIDED = 0.7, 0.1
+"""A factor of an adapter with which its captions need all guidance, and the share of it with which they do at 1."""
+
+
 @dataclass(frozen=True, eq=False)
 class Prior:
     """A diffusion model of motion, ready to sample."""
@@ -89,6 +96,8 @@ class Prior:
     """What it has learned, in words; None: its file does not say."""
     origin: str = ""
     """The fingerprint of the network that adapters were merged into; empty where none were."""
+    taught: tuple[tuple[str, float], ...] = ()
+    """The captions that these were taught, each with the factor of its adapter."""
 
     @staticmethod
     def load(weights: str | Path = "default", *, device: str = "cpu") -> "Prior":
@@ -138,9 +147,29 @@ class Prior:
             return self
         for adapter, _ in adapters:
             adapter.check_prior(self)
-        texts = [text for adapter, factor in adapters if factor > 0 for text in adapter.captions]
+        taught = tuple((text, factor) for adapter, factor in adapters if factor > 0 for text in adapter.captions)
+        texts = [text for text, _ in taught]
         known = add_sentences(self.known, texts, self.text) if self.known is not None and texts else self.known
-        return replace(self, net=merged(self.net, adapters), origin=origin(self), known=known)
+        return replace(
+            self, net=merged(self.net, adapters), origin=origin(self), known=known, taught=(*self.taught, *taught)
+        )
+
+    def guided_shares(self, prompts: Sequence[str]) -> Array:
+        """(prompts,) of what guidance adds to 1, the share that is right for each prompt: all of it, or `LEAST_GUIDED`.
+
+        The estimate without words knows nothing of what an adapter was taught, so guidance exaggerates the taught
+        words until nothing moves any more. Other words for the same need it (decision 0019).
+        """
+        if not self.taught:
+            return np.ones(len(prompts))
+        near = unit(self.text.encode([bare(text) for text in prompts]).pooled) @ self._taught_vectors.T
+        close = ((near - UNLIKE) / (ALIKE - UNLIKE)).clip(0, 1)
+        whole = np.array([(factor - HALF_TAUGHT) / (1 - HALF_TAUGHT) for _, factor in self.taught]).clip(0, 1)
+        return 1 - (1 - LEAST_GUIDED) * (close * whole).max(axis=1)
+
+    @cached_property
+    def _taught_vectors(self) -> Array:
+        return unit(self.text.encode([bare(text) for text, _ in self.taught]).pooled)
 
     def condition(self, prompts: list[str], lengths: list[int] | None = None) -> Condition:
         """Encode prompts, one row each; an empty prompt is for nothing in particular."""
