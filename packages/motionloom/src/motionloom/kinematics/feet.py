@@ -83,7 +83,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         ends = places[since:, ankle] - [0, height, 0]
         moved = correction(ends, ends + tip[since:], flags[since:], fps, held=shown > 0, level=True)
         targets[since:, i] += moved
-        targets[:, i, 1] += free * _lifts(standing[:, 2 * i : 2 * i + 2].any(axis=1) > flags.any(axis=1))
+        targets[:, i, 1] += free * _lifts(np.asarray(standing[:, 2 * i : 2 * i + 2].any(axis=1) > flags.any(axis=1)))
         stretched = envelope(_overreach(places, targets, i), round(_LIFT_EASE * fps))
         targets[since:, i, 1] += np.minimum(stretched[since:], -np.minimum(moved[:, 1], 0))
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
