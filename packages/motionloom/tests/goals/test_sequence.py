@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.goals.sequence import MOST_PARTS, SHORTEST, Part, lengths, natural_seconds, split_actions
+from motionloom.goals.seconds import SHORTEST, natural_seconds
+from motionloom.goals.sequence import MOST_PARTS, Part, lengths, split_actions
 
 SEQUENCES = {
     "a person walks forward, then sits down": ["a person walks forward", "a person sits down"],

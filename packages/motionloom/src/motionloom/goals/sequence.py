@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motionloom.goals.amounts import read_amount, read_seconds
+from motionloom.goals.seconds import LONGEST, MOST_AT_ONCE, SHORTEST, natural_seconds, seconds_alone
 from motionloom.goals.verbs import (
     MOODS,
     NOUNS_AFTER,
@@ -21,17 +22,12 @@ from motionloom.goals.verbs import (
     base_of,
     finite,
     kind_of,
-    kind_of_verb,
     mood_of,
     subject_of,
     verb_of,
 )
 
 MOST_PARTS = 20
-SHORTEST = 1.2
-"""Seconds of the shortest part."""
-LONGEST = 12.0
-"""Seconds of the longest part by nature; a longer one is requested in numbers."""
 
 
 @dataclass(frozen=True)
@@ -41,38 +37,6 @@ class Part:
     text: str
     seconds: float
 
-
-_SECONDS = {
-    "locomotion": 4.0,
-    "gesture": 4.0,
-    "state": 3.0,
-    "change": 3.0,
-    "event": 2.5,
-    "jump": 2.5,
-    "turn": 3.0,
-    "fight": 3.0,
-    "dance": 5.0,
-    "other": 4.0,
-}
-"""Kinds of verbs, and the seconds such an action takes."""
-_GOES_ON, WHOLE = ("locomotion", "state", "dance"), 5.0
-"""What can go on, and what is repeated, does so for `WHOLE` seconds where it is the whole sentence."""
-_REPEATS = re.compile(
-    r"\b(?:jumping jacks|(?:push|sit|pull)-?ups|up and down|back and forth|to and fro|side to side|again and again"
-    r"|repeatedly|keeps?)\b",
-    re.IGNORECASE,
-)
-_STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
-_ON_STAIRS = 4.0
-"""People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
-_LONGER = (
-    (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
-    (_FALLS := re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
-    (re.compile(r"\bturn(?:s|ed|ing)? (?:\w+ )?(?:around|round|about|back)\b"), 3.0),
-)
-"""What takes longer than others of its kind."""
-MOST_AT_ONCE = 9.8
-"""The longest motion of the recordings that the weights were trained on."""
 
 _THEN = re.compile(
     r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this"
@@ -105,30 +69,6 @@ _LASTS = re.compile(
 )
 """Predicates of somebody who goes on being as they are."""
 _POSTURES = ("sit", "lie", "lay", "kneel", "crouch", "squat")
-_REPEATED = re.compile(
-    r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ )?"
-    r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
-    r"|burpees|crunches|claps|nods|bows|hops"
-    r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches"
-    r"|laps|reps|repetitions|jabs"
-    r"|swings|throws|leaps|knocks|strikes|sets|rounds|bends|dips|twirls)\b"
-)
-_NUMBER = {
-    "once": 1,
-    "twice": 2,
-    "thrice": 3,
-    "two": 2,
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "six": 6,
-    "seven": 7,
-    "eight": 8,
-    "nine": 9,
-    "ten": 10,
-    "several": 4,
-    "few": 3,
-}
 
 
 def split_actions(text: str) -> tuple[Part, ...]:
@@ -206,50 +146,13 @@ def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float =
     return [(end - begin) / fps for begin, end in zip([0, *ends], ends, strict=False)]
 
 
-def natural_seconds(text: str) -> float:
-    """How long an action takes people, by its kind, its numbers and how quickly it is done; 1.2 to 12 s."""
-    words = text.lower()
-    if (explicit := read_seconds(text)) is not None:
-        return max(explicit, SHORTEST)
-    kind = _kind(words)
-    seconds = _SECONDS[kind]
-    if kind in ("change", "event") or _FALLS.search(words):  # "stumbles and falls"
-        seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
-    if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
-        seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
-    elif match := re.search(r"\b(\d+|[a-z]+) times\b", words):
-        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
-    elif re.search(r"\b(twice|thrice)\b", words):
-        seconds *= 1.6 if "twice" in words else 2.2
-    elif match := _REPEATED.search(words):
-        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
-    if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", words):
-        seconds = max(seconds, 6.0)
-    if re.search(r"\b(slowly|slow|carefully|gently)\b", words):
-        seconds *= 1.3
-    elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", words):
-        seconds *= 0.8
-    return round(min(max(seconds, SHORTEST), LONGEST), 2)
-
-
 def usual_seconds(text: str) -> float:
-    """Seconds of a whole sentence without a length: what it takes people (`natural_seconds`), or all of its actions.
+    """Seconds of a whole sentence without a length: what all of its actions take, `MOST_AT_ONCE` at most.
 
-    What can go on or is repeated (walking, dancing, standing, jumping jacks) goes on for 5 s, on stairs 4 s; several
-    actions take `MOST_AT_ONCE` at most.
+    What can go on or is repeated goes on for longer where it is all there is (`seconds.seconds_alone`).
     """
     parts = split_actions(text)
-    if len(parts) > 1:
-        return min(sum(part.seconds for part in parts), MOST_AT_ONCE)
-    goes_on = _kind(text.lower()) in _GOES_ON and not _FALLS.search(text.lower())
-    if read_seconds(text) is None and (goes_on or _REPEATS.search(text)):
-        return _ON_STAIRS if _STAIRS.search(text) else max(natural_seconds(text), WHOLE)
-    return natural_seconds(text)
-
-
-def _kind(words: str) -> str:
-    """The kind of the first verb in words of small letters."""
-    return next((kind_of_verb(word, words) for word in re.findall(r"[a-z]+", words) if base_of(word)), "other")
+    return seconds_alone(text) if len(parts) == 1 else min(sum(part.seconds for part in parts), MOST_AT_ONCE)
 
 
 def _part_seconds(part: str) -> float:
@@ -380,10 +283,6 @@ def _is_subordinate(item: str, join: str, piece: str) -> bool:
     if _COUNTED.search(item) and _STOPS.fullmatch(piece.strip()):
         return True
     return "," not in join and bool(_SUBORDINATE.search(item))
-
-
-def _count(word: str) -> int:
-    return int(float(word)) if re.fullmatch(r"\d+(?:\.\d+)?", word) else _NUMBER.get(word, 0)
 
 
 # Parts of a sentence that say what is done only together with the part before. A part is generated by itself, so it
