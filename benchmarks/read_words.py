@@ -41,7 +41,7 @@ SEEDS = range(5)
 def main() -> None:
     """Print a line for each sentence: what is drawn of it, and what the network draws alone."""
     prior = Prior.load("default")
-    print("sentence | asked | drawn, seeds 0 to 4 | kept | without reading: 5 s | kept")
+    print("sentence | asked | drawn, seeds 0 to 4 | kept | without reading: usual length | kept")
     for text in sys.argv[1:] or SENTENCES:
         asked = read(prior, text)
         (reading,) = asked.readings
