@@ -423,3 +423,10 @@ def test_numbers_beyond_all_bounds_are_refused_wherever_they_are(tmp_path):
 def test_a_sentence_without_a_length_is_as_long_as_its_action_takes_people(text: str, seconds: float) -> None:
     assert [segment.seconds for segment in timeline_of(text).segments] == [seconds]
     assert timeline_of(text, 6.0).segments[0].seconds == 6.0
+
+
+@pytest.mark.parametrize("text", ["a person jumps {} times", "a person takes {} steps", "a man does {} squats"])
+@pytest.mark.parametrize("amounts", [True, False])
+def test_numbers_beyond_all_bounds_are_some_seconds(text: str, amounts: bool) -> None:
+    timeline = timeline_of(text.format("9" * 400), amounts=amounts)
+    assert 1.0 < timeline.seconds <= 60.0

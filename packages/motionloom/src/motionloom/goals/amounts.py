@@ -221,7 +221,7 @@ def _repetitions(phrase: str) -> Amount | None:
     if len(kinds) != 1:
         return None
     size = float(many[0][1]) if many else _repeat_count(*often[0])
-    if size != int(size) or not 1 <= size <= MOST_TIMES:
+    if not 1 <= size <= MOST_TIMES or size != int(size):
         return None
     return Amount("count", size, _side(phrase) or "forward", of=kinds.pop())
 
@@ -266,7 +266,7 @@ def _steps(phrase: str, verbs: list[str]) -> Amount | None:
         return None
     size, direction = matches[0][2] or "", _direction(phrase, aside=True)
     count = float(matches[0][1]) if matches[0][1] else 1.0
-    if direction is None or count != int(count) or not 1 <= count <= MOST_STEPS:
+    if direction is None or not 1 <= count <= MOST_STEPS or count != int(count):
         return None
     stride = {"forward": 0.62, "backward": 0.4}.get(direction, 0.4)
     if size in ("small", "tiny", "short", "baby", "little"):

@@ -110,4 +110,4 @@ def _kind(words: str) -> str:
 
 
 def _count(word: str) -> int:
-    return int(float(word)) if re.fullmatch(r"\d+(?:\.\d+)?", word) else _NUMBER.get(word, 0)
+    return int(min(float(word), 1000)) if re.fullmatch(r"\d+(?:\.\d+)?", word) else _NUMBER.get(word, 0)
