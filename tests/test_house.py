@@ -29,7 +29,7 @@ BUDGETS = {
     "goals": 5_076,
     "cli": 5_071,
     "lab/papers": 5_007,
-    "bulk": 4_329,
+    "bulk": 4_337,
     "train/(top)": 4_318,
     "lab/metrics": 3_494,
     "retarget": 3_002,

@@ -16,7 +16,7 @@ import pytest
 from motionloom.bulk import claim as claim_module
 from motionloom.bulk.batch import LOCAL, Where, batch
 from motionloom.bulk.claim import STALE, Driver, Share, claim, living, names
-from motionloom.bulk.folder import Store
+from motionloom.bulk.folder import RECORDS, Store
 from motionloom.bulk.metadata import read_batch
 from motionloom.errors import MotionloomError
 from tests.bulk.rows import options, rows, write_jobs
@@ -202,6 +202,15 @@ def test_of_two_drivers_that_begin_at_once_one_makes_everything(weights: str, fo
     for one in both:
         assert one.returncode == 0 or f"is being made by process {winners[0]} on" in errors[one.pid]
     assert [one.state for one in read_batch(out, motions=False)] == ["made"] * 60
+
+
+def test_who_has_only_just_begun_is_named_before_the_folder_is_called_damaged(weights: str, folder: Path) -> None:
+    jobs, out = write_jobs(folder / "jobs.jsonl", rows(6)), folder / "out"
+    with claim(out, (0, 1)):
+        (out / RECORDS).mkdir()
+        second = start(weights, jobs, out, "--workers", "1")
+        assert f"is being made by process {os.getpid()} on" in second.communicate(timeout=100)[1]
+    assert second.returncode == 2
 
 
 @pytest.mark.slow

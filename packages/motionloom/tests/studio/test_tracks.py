@@ -110,9 +110,9 @@ def test_an_arm_follows_a_clip_that_was_put_aside(studio: Studio):
     studio.key("w")
     studio.page.mouse.dblclick(*studio.middle(".track.words .block"))
     studio.page.keyboard.type("a person walks forward")
-    studio.key("Enter", "Escape")
+    studio.key("Enter")
     walk = studio.motion()
-    studio.key("Home", "Shift+A", "Escape")
+    studio.key("Escape", "Home", "Shift+A", "Escape")
     studio.page.locator("#inspector select[aria-label='What it follows']").select_option(index=1)
     project = studio.project()
     assert project["people"][0]["tracks"][0]["clip"]["motion"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from motionloom.bulk.claim import claim
+from motionloom.bulk.claim import claim, refuse_beside
 from motionloom.bulk.crew import alone, cores, gpus
 from motionloom.bulk.folder import Head, Store, check_settings, digest, open_folder, read_manifest
 from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
@@ -86,6 +86,7 @@ def run(
     count = jobs.count() if rows is None else rows
     check_jobs(jobs, count)
     shard_rows = options.shard_rows or shard_size(count)
+    refuse_beside(out, where.shard or (0, 1))  # who works there may have got no further than to say so
     check_settings(out, options, rows=count, shard_rows=shard_rows, force=force)  # before anything is generated
     with claim(out, where.shard or (0, 1)) as claimed:
         if not force:

@@ -129,6 +129,11 @@ def claim(out: Path, share: Share) -> Iterator[Claim]:
         held.end()
 
 
+def refuse_beside(out: Path, share: Share) -> None:
+    """Raise `MotionloomError` where a living driver has one of the share's shards; nothing is claimed."""
+    _gone(out / WORK, share)
+
+
 def living(out: Path, share: Share = (0, 1)) -> Driver | None:
     """A driver that works in the folder, on one of the shards of a share; None: nobody does, as far as is known."""
     others = _others(out / WORK, share)
