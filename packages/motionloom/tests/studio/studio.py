@@ -159,6 +159,16 @@ class Studio:
         self.drawn()
         return self.server.ask("/project")
 
+    def caught_up(self) -> dict[str, Any]:
+        """The project once its motion is as long as its blocks: a draw that failed without a server comes again."""
+        for _ in range(SLOW // 1000):
+            project = self.project()
+            whole = sum(one["seconds"] for one in project["segments"])
+            if project["takes"] and abs(project["takes"][0]["seconds"] - whole) < 0.01:
+                return project
+            self.page.wait_for_timeout(200)
+        raise AssertionError("the motion never was as long as the blocks")
+
     def blocks(self) -> list[tuple[str, float]]:
         """Words and seconds of the blocks."""
         return [(one["text"], one["seconds"]) for one in self.project()["segments"]]

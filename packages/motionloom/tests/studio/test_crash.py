@@ -19,7 +19,7 @@ def test_a_killed_server_comes_back_and_nothing_is_lost(studio: Studio):
     studio.key("d")
     studio.server.start()
     page.wait_for_selector(".notice.away", state="detached")
-    project = studio.project()
+    project = studio.caught_up()
     assert len(project["segments"]) == 4
     assert [one["id"] for one in project["segments"][:3]] == [one["id"] for one in before["segments"]]
     motion = studio.motion(project)

@@ -137,6 +137,6 @@ def test_a_server_that_is_away_is_reported_and_nothing_is_lost(studio: Studio):
     studio.page.wait_for_selector(".notice.away")
     studio.page.unroute("**/*")
     studio.page.wait_for_selector(".notice.away", state="detached")
-    project = studio.project()
+    project = studio.caught_up()
     assert len(project["segments"]) == 2
     assert abs(project["takes"][0]["seconds"] - 4.0) < 0.01
