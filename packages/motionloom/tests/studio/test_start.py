@@ -117,10 +117,10 @@ def test_save_as_goes_on_in_a_copy(empty: Studio):
 def test_a_project_file_is_opened_as_a_project_of_its_own(empty: Studio, tmp_path: Path):
     old = empty.project()
     file = tmp_path / "film.loom.json"
-    blocks = [{"id": "a", "text": "a person sits down", "seconds": 2}]
+    blocks = [{"id": "a", "text": "a person crawls", "seconds": 2}]
     file.write_text(json.dumps({"version": 2, "name": "From a file", "segments": blocks}))
     empty.drop(file)
-    empty.says(empty.page.locator(".block"), "a person sits down")
+    empty.says(empty.page.locator(".block"), "a person crawls")
     project = empty.project()
     assert (project["name"], project["id"] != old["id"]) == ("From a file", True)
     assert old["name"] in names(empty)
