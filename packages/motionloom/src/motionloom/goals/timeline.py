@@ -28,7 +28,7 @@ from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.goals.sequence import Part, lengths, split_actions, usual_seconds
-from motionloom.goals.verbs import subject_of
+from motionloom.goals.verbs import in_plainer_verbs, subject_of
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
 from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
@@ -78,6 +78,11 @@ class Timeline:
         for segment in self.segments:
             at.append(at[-1] + _frames(segment.seconds))
         return tuple(at)
+
+    @property
+    def plainer(self) -> "Timeline":
+        """The same with the nearest common verb for each rare one (`verbs.in_plainer_verbs`)."""
+        return replace(self, segments=tuple(replace(one, text=in_plainer_verbs(one.text)) for one in self.segments))
 
     @property
     def frames(self) -> int:

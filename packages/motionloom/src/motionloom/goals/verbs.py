@@ -18,17 +18,16 @@ PRONOUN = re.compile(
 _ADVERB = r"(?:(?:\w+ly|then|again|suddenly|once|twice|just|also|first|finally|soon)\s+)*"
 
 
-def _forms() -> dict[str, dict[str, str]]:
+def _forms(*bases: str) -> dict[str, dict[str, str]]:
     """Of each mood ("third", "base", "past", "gerund") the forms with their base."""
     moods: dict[str, dict[str, str]] = {"third": {}, "base": {}, "past": {}, "gerund": {}}
-    for words in _TABLES["kinds"].values():
-        for base in words:
-            moods["third"][_third(base)] = base
-            moods["base"][base] = base
-            stem = base + base[-1] if base in _TABLES["doubled"] else base
-            past = f"{stem[:-1]}ied" if stem.endswith("y") and stem[-2] not in "aeo" else f"{stem.removesuffix('e')}ed"
-            moods["past"][_TABLES["past"].get(base, past)] = base
-            moods["gerund"]["lying" if base == "lie" else _gerund(stem)] = base
+    for base in bases:
+        moods["third"][_third(base)] = base
+        moods["base"][base] = base
+        stem = base + base[-1] if base in _TABLES["doubled"] else base
+        past = f"{stem[:-1]}ied" if stem.endswith("y") and stem[-2] not in "aeo" else f"{stem.removesuffix('e')}ed"
+        moods["past"][_TABLES["past"].get(base, past)] = base
+        moods["gerund"]["lying" if base == "lie" else _gerund(stem)] = base
     return moods
 
 
@@ -42,10 +41,12 @@ def _gerund(stem: str) -> str:
     return (stem[:-1] if stem.endswith("e") and not stem.endswith("ee") else stem) + "ing"
 
 
-MOODS = _forms()
+_PLAINER: dict[str, str] = _TABLES["plainer"]
+MOODS = _forms(*(base for words in _TABLES["kinds"].values() for base in words), *_PLAINER)
 _FORMS = {form for forms in MOODS.values() for form in forms}
 _ADVERBS = {"then", "again", "once", "twice", "just", "also", "first", "finally", "soon", "next", "and", "but", "now"}
 _KINDS = {base: kind for kind, words in reversed(_TABLES["kinds"].items()) for base in words}
+_KINDS |= {base: _KINDS[plain.split(" ")[0]] for base, plain in _PLAINER.items() if base not in _KINDS}
 
 
 def subject_of(clause: str) -> str:
@@ -105,3 +106,31 @@ def kind_of_verb(word: str, phrase: str) -> str:
     if changed and re.search(changed[1], phrase):
         return changed[0]
     return _KINDS.get(base, "other")
+
+
+_NAMED = re.compile(r"\b(?:an?|the|this|that|one|his|her|its|their|my|your|of|on|in|at|with) $", re.IGNORECASE)
+
+
+def in_plainer_verbs(text: str) -> str:
+    """A sentence with the nearest common verb for each rare one: "a soldier trudges home" as "a soldier walks home".
+
+    A form that can be a noun ("on patrol") counts as a verb unless a determiner or preposition is before it; a base
+    form only where a sentence begins with it or behind "to".
+    """
+
+    def common(match: re.Match[str]) -> str:
+        word = match[0]
+        mood = next((mood for mood, forms in MOODS.items() if forms.get(word.lower()) in _PLAINER), "")
+        before = text[: match.start()]
+        if not mood or _NAMED.search(before):
+            return word
+        if mood == "base" and not re.search(r"(?:^|[.,;]|\bto|\bthen|\band)\s*$", before, re.IGNORECASE):
+            return word
+        verb, _, rest = _PLAINER[MOODS[mood][word.lower()]].partition(" ")
+        form = next(inflected for inflected, base in MOODS[mood].items() if base == verb)
+        form = form.capitalize() if word[0].isupper() else form
+        if rest and re.match(rf"\W*{rest}\b", text[match.end() :], re.IGNORECASE):
+            return form
+        return f"{form} {rest}" if rest else form
+
+    return re.sub(r"[A-Za-z]+", common, text)

@@ -4,7 +4,8 @@ A number that the words say is a goal or a length (`motionloom.goals.timeline.ti
 met; steps and repetitions are counted in the motion, and where the number differs it is sampled again from another
 seed, with a shorter or longer way or stroke, `TRIES` times at most. What else the words say plainly
 (`motionloom.goals.expected`: a turn to the left, a wave, a kick of the right leg) is looked for in `ATTEMPTS` motions
-at most. The result is the one with the least missing.
+at most, of which all but the first have a common verb for each rare one ("walks" for "trudges"). The result is the one
+with the least missing.
 """
 
 import re
@@ -79,6 +80,8 @@ class Worded:
     """The numbers in the words, in their order."""
     attempts: int = 1
     """Motions in which what the words say plainly was looked for, at most."""
+    said: Timeline | None = None
+    """The timeline before its verbs were replaced; None: they were not."""
     unknown: Mapping[str, str] = field(default_factory=dict)
     """The texts that the weights do not know, each with a sentence about it (`motionloom.goals.remarks`)."""
 
@@ -88,7 +91,7 @@ class Worded:
         places, begins = self.motion.positions(), self.timeline.begins
         counted = {i for one in self.timeline.readings for i in range(one.first, one.end)}
         free = [i for i in range(len(begins) - 1) if i not in counted]
-        texts = [segment.text for segment in self.timeline.segments]
+        texts = [segment.text for segment in self.timeline.plainer.segments]
         if len(texts) == 1 and free:
             return missing(texts[0], places, self.motion.fps)
         return [name for i in free for name in missing(texts[i], places[begins[i] : begins[i + 1]], self.motion.fps)]
@@ -101,12 +104,24 @@ class Worded:
         return [*filter(None, (numbers_read(self.timeline), parts_read(self.timeline))), *unknown, *self.shortfalls]
 
     @property
+    def replaced(self) -> str:
+        """A sentence with the common verbs that replace rare ones; empty where none does."""
+        if self.said is None:
+            return ""
+        both = zip(self.said.segments, self.timeline.segments, strict=True)
+        changed = dict.fromkeys((one.text, other.text) for one, other in both if one.text != other.text)
+        both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
+        return both_ways and f"{both_ways}, which these weights know better"
+
+    @property
     def shortfalls(self) -> list[str]:
-        """A sentence for each number that was missed, for what is not shown, and for an end where nothing happens."""
+        """A sentence for verbs that were replaced, for each number that was missed, for what is not shown, and for an
+        end where nothing happens."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
         looked = self.attempts > 1 and self.missing
         unseen = f"not found in {self.attempts} attempts: {', '.join(self.missing)}" if looked else ""
-        return [*filter(None, [*(amount.problem for amount in self.amounts), unseen, self.stillness(of=share)])]
+        problems = [amount.problem for amount in self.amounts]
+        return [*filter(None, [self.replaced, *problems, unseen, self.stillness(of=share)])]
 
     @property
     def still_from(self) -> float | None:
@@ -251,13 +266,15 @@ def _best_attempts(
 ) -> Iterator[Worded]:
     """Motions of one free action each, in order; of each the attempt with the least missing, the first of equals."""
     best: dict[int, Worded] = {}
+    plainer = [one.plainer for one in timelines]
     unseen, finished = list(range(len(timelines))), 0
     first, later = _once_at_its_end(progress)
     for number in range(attempts):
+        words = plainer if number else timelines
         sampled = generate_each(
             prior,
-            [timelines[i].segments[0].text for i in unseen],
-            [timelines[i].segments[0].seconds for i in unseen],
+            [words[i].segments[0].text for i in unseen],
+            [words[i].segments[0].seconds for i in unseen],
             seeds=[_attempt_seed(seeds[i], number) for i in unseen],
             foot_lock=foot_lock,
             sampling=sampling,
@@ -266,7 +283,7 @@ def _best_attempts(
         again = set(unseen)
         for place, motion in _unwatched(sampled) if number else sampled:
             i = unseen[place]
-            attempt = Worded(motion, timelines[i], (), attempts)
+            attempt = Worded(motion, words[i], (), attempts, timelines[i] if number else None)
             if i not in best or len(attempt.missing) < len(best[i].missing):
                 best[i] = attempt
             if number + 1 == attempts or not best[i].missing:
@@ -311,10 +328,11 @@ def _best_try(
     least, shares, best = (np.inf, 0), [1.0] * len(timeline.readings), None
     counts = any(reading.amount.kind in ("count", "steps") for reading in timeline.readings)
     for number in range(TRIES if counts else attempts):
-        now = _scaled(timeline, shares)
+        said = _scaled(timeline, shares)
+        now = said.plainer if number else said
         own = replace(sampling, seed=_attempt_seed(seed, number), first=0)
         motion = _sample_timeline(prior, now, own, foot_lock)
-        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts)
+        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said if number else None)
         counted = [
             one
             for one, reading in zip(candidate.amounts, now.readings, strict=True)
