@@ -62,7 +62,7 @@ export function inDigits(text: string, lower = true): string {
     .replace(/\bhalf an? (?=m(?:et|in)|second|foot|yard)/g, "0.5 ")
     .replace(/\ba couple of (?=m(?:et|in)|second|feet|yard|step)|\ba pair of (?=step)/g, "2 ")
     .replace(/\b(?:about|around|approximately|roughly|exactly|some) (?=\d)/g, "")
-    .replace(/\bfor an? (?=(?:full |whole )?(?:minute|second)\b)(?:full |whole )?/g, "for 1 ");
+    .replace(/\bfor an? (?=minute\b|(?:full |whole )(?:minute|second)\b)(?:full |whole )?/g, "for 1 ");
 }
 
 /** What the words of one action ask for in numbers; null without. */

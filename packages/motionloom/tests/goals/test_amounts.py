@@ -94,6 +94,8 @@ def test_durations() -> None:
     assert read_seconds("a person waves for ten seconds") == 10
     assert read_seconds("a person waves for half a minute") == 30
     assert read_seconds("a person waits for a minute") == 60
+    assert read_seconds("a person sits down for a second") is None
+    assert read_seconds("a person sits for one second") == read_seconds("a person sits for a full second") == 1
     assert read_seconds("a person waits for 90 minutes") is None
     assert read_seconds("a person waits for a bus") is None
 

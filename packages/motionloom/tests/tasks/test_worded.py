@@ -110,6 +110,28 @@ def test_what_is_not_shown_is_generated_again(prior: Prior, monkeypatch: pytest.
     np.testing.assert_allclose(motions[1].motion.positions(), third.positions(), atol=1e-5)
 
 
+def test_later_attempts_have_common_verbs_for_rare_ones(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[str] = []
+
+    def missing(text: str, *_) -> list[str]:
+        looked.append(text)
+        return ["a way"] if len(looked) == 1 else []
+
+    monkeypatch.setattr(worded, "missing", missing)
+    (one,) = worded.generate_worded(prior, "a soldier trudges home", seconds=1.0, steps=2, seed=7)
+    assert looked == ["a soldier walks home"] * 2, "the first motion is held against the common verb as well"
+    assert one.timeline.segments[0].text == "a soldier walks home"
+    line = "'a soldier trudges home' is generated as 'a soldier walks home', which these weights know better"
+    assert line in one.shortfalls
+    (kept,) = worded.generate_worded(prior, "a soldier trudges home", seconds=1.0, steps=2, seed=7)
+    assert not kept.replaced
+    assert kept.timeline.segments[0].text == "a soldier trudges home"
+    looked.clear()
+    (several,) = worded.generate_worded(prior, "a man saunters in, then waves", seconds=3.0, steps=2)
+    assert several.replaced.startswith("'a man saunters in' is generated as 'a man walks in'")
+    assert several.timeline.segments[1].text == "a man waves"
+
+
 def test_who_watches_sees_the_first_attempts_and_goes_on_watching(
     prior: Prior, monkeypatch: pytest.MonkeyPatch
 ) -> None:

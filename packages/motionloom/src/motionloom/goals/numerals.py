@@ -29,7 +29,8 @@ def in_digits(text: str, *, lower: bool = True) -> str:
     result = re.sub(r"\bhalf an? (?=m(?:et|in)|second|foot|yard)", "0.5 ", result)
     result = re.sub(r"\ba couple of (?=m(?:et|in)|second|feet|yard|step)|\ba pair of (?=step)", "2 ", result)
     result = re.sub(r"\b(?:about|around|approximately|roughly|exactly|some) (?=\d)", "", result)
-    return re.sub(r"\bfor an? (?=(?:full |whole )?(?:minute|second)\b)(?:full |whole )?", "for 1 ", result)
+    # "for a second" is an idiom; nobody sits down in one
+    return re.sub(r"\bfor an? (?=minute\b|(?:full |whole )(?:minute|second)\b)(?:full |whole )?", "for 1 ", result)
 
 
 def _value(match: re.Match[str]) -> str:

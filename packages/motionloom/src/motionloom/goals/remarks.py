@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from motionloom.goals.contact import read_contact
 from motionloom.goals.roles import MARK, prompts_of, without_two
 from motionloom.goals.timeline import Timeline
-from motionloom.goals.verbs import subject_of
+from motionloom.goals.verbs import in_plainer_verbs, subject_of
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
 
@@ -20,7 +20,7 @@ class Remark:
     text: str
     line: str
     instead: tuple[str, ...] = ()
-    """The nearest sentences that are known."""
+    """Sentences to say instead: the same with common verbs for rare ones, and the nearest that are known."""
 
 
 _LIGHT_WORDS = "do does make take play perform give use put ride go goes get start begin come throw have"
@@ -88,7 +88,12 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) 
         if text not in english
     ]
     matches = nearest_known(english, known, encoder) if known else []
-    return remarks + [Remark(one.prompt, one.remark(), one.sentences) for one in matches if not one.near]
+    return remarks + [Remark(one.prompt, one.remark(), _instead(one)) for one in matches if not one.near]
+
+
+def _instead(match: Nearest) -> tuple[str, ...]:
+    plainer = in_plainer_verbs(match.prompt)
+    return match.sentences if plainer == match.prompt else (plainer, *match.sentences)
 
 
 def nearest_known(texts: Sequence[str], known: Known, encoder: TextEncoder) -> list[Nearest]:

@@ -41,6 +41,7 @@ class Part:
 _THEN = re.compile(
     r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this"
     r"|which)|next(?! to\b)|subsequently"
+    r"|(?:a|one|some) (?:short |little )?(?:moment|second|instant|while|bit) later|(?:moments|seconds) later"
     r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?"
     r"(?:after (?:a|some|one) (?:short |little |brief )?(?:moment|while|second|pause|bit|time)\b\s*,?\s*)?"
     r"|\s*[.;]\s+(?=\S)",
@@ -225,7 +226,7 @@ def _split_list(clause: str) -> list[str]:
             joins.append(join)
         else:
             items[-1] += join + piece
-    if len(items) < 2:
+    if len(items) < 2 or (len(items) == 2 and _COMES_UP.match(items[1]) and read_amount(clause)):
         return [clause]
     if len(items) > 2:
         return items
@@ -326,6 +327,10 @@ _UP_AGAIN = re.compile(
     r"(?:up|(?:on)?to (?:his|her|their|your) feet|on (?:his|her|their|your) feet)(?: again)?",
     re.IGNORECASE,
 )
+_COMES_UP = re.compile(
+    r"(?:stand|come|get|go|rise|straighten)(?:es|s)? (?:right |straight )?(?:back )?up\b", re.IGNORECASE
+)
+"""What only ends each of several repetitions: "squats down and comes back up three times"."""
 _BACK_AGAIN = re.compile(r"(walk|run|jog|come|go)(?:es|s)? back\b.*|returns?\b.*", re.IGNORECASE)
 _TURNED = re.compile(r"\bturn(?:s|ed)? (?:around|round|about|back)\b", re.IGNORECASE)
 _SEATED = re.compile(r"\b(?:sits?|seat)\b", re.IGNORECASE)

@@ -41,12 +41,13 @@ def _gerund(stem: str) -> str:
     return (stem[:-1] if stem.endswith("e") and not stem.endswith("ee") else stem) + "ing"
 
 
-_PLAINER: dict[str, str] = _TABLES["plainer"]
-MOODS = _forms(*(base for words in _TABLES["kinds"].values() for base in words), *_PLAINER)
+PLAINER: dict[str, str] = _TABLES["plainer"]
+"""Bases of rare verbs, each with the base of a common one and what belongs to it: "walk slowly"."""
+MOODS = _forms(*(base for words in _TABLES["kinds"].values() for base in words), *PLAINER)
 _FORMS = {form for forms in MOODS.values() for form in forms}
 _ADVERBS = {"then", "again", "once", "twice", "just", "also", "first", "finally", "soon", "next", "and", "but", "now"}
 _KINDS = {base: kind for kind, words in reversed(_TABLES["kinds"].items()) for base in words}
-_KINDS |= {base: _KINDS[plain.split(" ")[0]] for base, plain in _PLAINER.items() if base not in _KINDS}
+_KINDS |= {base: _KINDS[plain.split(" ")[0]] for base, plain in PLAINER.items() if base not in _KINDS}
 
 
 def subject_of(clause: str) -> str:
@@ -120,13 +121,13 @@ def in_plainer_verbs(text: str) -> str:
 
     def common(match: re.Match[str]) -> str:
         word = match[0]
-        mood = next((mood for mood, forms in MOODS.items() if forms.get(word.lower()) in _PLAINER), "")
+        mood = next((mood for mood, forms in MOODS.items() if forms.get(word.lower()) in PLAINER), "")
         before = text[: match.start()]
         if not mood or _NAMED.search(before):
             return word
         if mood == "base" and not re.search(r"(?:^|[.,;]|\bto|\bthen|\band)\s*$", before, re.IGNORECASE):
             return word
-        verb, _, rest = _PLAINER[MOODS[mood][word.lower()]].partition(" ")
+        verb, _, rest = PLAINER[MOODS[mood][word.lower()]].partition(" ")
         form = next(inflected for inflected, base in MOODS[mood].items() if base == verb)
         form = form.capitalize() if word[0].isupper() else form
         if rest and re.match(rf"\W*{rest}\b", text[match.end() :], re.IGNORECASE):

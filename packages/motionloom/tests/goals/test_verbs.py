@@ -1,0 +1,46 @@
+"""Common verbs for rare ones."""
+
+import pytest
+
+from motionloom.goals.expected import expectations_of
+from motionloom.goals.verbs import MOODS, PLAINER, base_of, in_plainer_verbs, kind_of_verb
+
+
+@pytest.mark.parametrize(
+    ("text", "plainer"),
+    [
+        ("a soldier trudges home through the snow", "a soldier walks home through the snow"),
+        ("Saunter over to the bar", "Walk over to the bar"),
+        ("he is staggering, and then falls", "he is walking, and then falls"),
+        ("she tiptoed past the door", "she walked past the door"),
+        ("kids scurried away", "kids ran away"),
+        ("an old lady hobbles along", "an old lady walks slowly along"),
+        ("he moonwalks", "he walks backwards"),
+        ("somebody tries to sneak away", "somebody tries to walk away"),
+        ("she topples over", "she falls over"),
+        ("a man faints", "a man falls down"),
+        ("a man crumples down", "a man falls down"),
+        # nouns, and what is common already
+        ("a guard on patrol walks", "a guard on patrol walks"),
+        ("the march home", "the march home"),
+        ("he is on a trek", "he is on a trek"),
+        ("a person walks", "a person walks"),
+        ("", ""),
+    ],
+)
+def test_a_rare_verb_is_replaced_in_its_form(text: str, plainer: str) -> None:
+    assert in_plainer_verbs(text) == plainer
+    assert in_plainer_verbs(plainer) == plainer
+
+
+@pytest.mark.parametrize("rare", sorted(PLAINER))
+def test_what_replaces_a_verb_is_of_its_kind_and_is_looked_for(rare: str) -> None:
+    """So that the first motion is kept where it shows the action already."""
+    verb, _, rest = PLAINER[rare].partition(" ")
+    assert kind_of_verb(rare, rare) == kind_of_verb(verb, verb)
+    assert verb not in PLAINER
+    third = next(form for form, base in MOODS["third"].items() if base == rare)
+    sentence = in_plainer_verbs(f"a person {third} to the left")
+    assert sentence.startswith(f"a person {next(form for form, base in MOODS['third'].items() if base == verb)} {rest}")
+    assert base_of(third) == rare
+    assert expectations_of(sentence), sentence
