@@ -16,6 +16,7 @@ from motionloom.viz.film import find_ffmpeg
 from tests.server.serving import PATIENCE, Server
 
 client = pytest.importorskip("websockets.sync.client", reason="needs the extra 'studio'")
+exceptions = pytest.importorskip("websockets.exceptions")
 SMALL = {"format": "gif", "width": 96, "height": 64, "fps": 20, "count": 5}
 
 
@@ -53,6 +54,8 @@ def _filmed(server: Server, **fields: Any) -> bytes:
         size, data = _hear(socket)["size"], b""
         while len(data) < size:
             data += socket.recv(PATIENCE)
+        with pytest.raises(exceptions.ConnectionClosed):  # behind which nothing is left to do
+            socket.recv(PATIENCE)
     return data
 
 
