@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
+from motionloom.kinematics.gaze import looks
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks import worded
@@ -130,6 +131,23 @@ def test_later_attempts_have_common_verbs_for_rare_ones(prior: Prior, monkeypatc
     (several,) = worded.generate_worded(prior, "a man saunters in, then waves", seconds=3.0, steps=2)
     assert several.replaced.startswith("'a man saunters in' is generated as 'a man walks in'")
     assert several.timeline.segments[1].text == "a man waves"
+
+
+def test_a_head_does_what_the_words_say_in_their_own_time(prior: Prior) -> None:
+    words = "a person walks, then looks to the left"
+    (plain,), (one,) = (
+        worded.generate_worded(prior, words, seconds=4.0, steps=2, literal=literal) for literal in (True, False)
+    )
+    apart = np.degrees(np.arccos(np.clip((looks(plain.motion) * looks(one.motion)).sum(axis=1), -1, 1)))
+    _, begins, ends = one.timeline.begins
+    assert apart[:begins].max() < 0.1
+    assert apart[(begins + ends) // 2] > 10
+    (still,), (nods,) = (
+        worded.generate_worded(prior, "a person nods", seconds=2.0, steps=2, literal=literal)
+        for literal in (True, False)
+    )
+    assert np.ptp(looks(nods.motion)[:, 1] - looks(still.motion)[:, 1]) > 0.1
+    assert not nods.stillness(of=0.1)
 
 
 def test_who_watches_sees_the_first_attempts_and_goes_on_watching(

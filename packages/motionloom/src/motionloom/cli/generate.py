@@ -58,7 +58,8 @@ def run_generate(arguments: Namespace) -> int:
     timelines = {prompt: _timeline(arguments, prior, prompt, target.metre) for prompt in prompts}
     for timeline in timelines.values():
         check_loop(arguments, timeline.seconds)
-    remarks = unknown_words(prior, [part.text for one in timelines.values() for part in one.segments])
+    heads = not (arguments.literal or arguments.as_one)
+    remarks = unknown_words(prior, [part.text for one in timelines.values() for part in one.segments], heads=heads)
     output = finished_motions(files, captions, target, arguments.fps)
     worded: list[Worded] = []
     seated: list[list[Seat]] = []

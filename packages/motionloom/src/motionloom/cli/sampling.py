@@ -125,9 +125,9 @@ def remark_unknown(prior: Prior, prompts: Sequence[str]) -> list[str]:
     return list(unknown_words(prior, prompts).values())
 
 
-def unknown_words(prior: Prior, prompts: Sequence[str]) -> dict[str, str]:
-    """The prompts that `remark_unknown` has a line for, with the line."""
-    remarks = {one.text: one.line for one in remarks_on(prompts, prior.known, prior.text)}
+def unknown_words(prior: Prior, prompts: Sequence[str], *, heads: bool = False) -> dict[str, str]:
+    """The prompts that `remark_unknown` has a line for, with the line; heads: as of `remarks_on`."""
+    remarks = {one.text: one.line for one in remarks_on(prompts, prior.known, prior.text, heads=heads)}
     for line in remarks.values():
         say(line)
     return remarks

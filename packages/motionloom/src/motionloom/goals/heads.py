@@ -30,6 +30,18 @@ _TO = (
 )
 """Words, and the degrees to the left and up that they say."""
 _OFTEN = {"once": 1, "twice": 2, "thrice": 3}
+_LOOK = r"\blook(?:s|ed|ing)?"
+_SAID = re.compile(
+    r"\bnod(?:s|ded|ding)?\b(?! off)"
+    r"|\bsh(?:akes?|ook|aking) (?:his|her|their|its|your|my|the) heads?\b"
+    rf"|{_LOOK} (?:\w+ly )?(?:all )?(?:around|left and right|left|right|up|down|both ways|from side to side)\b"
+    r"(?! (?:for|the|an?|to see)\b)"
+    rf"|{_LOOK} (?:over |to |at )+(?:the |his |her |their |both )?(?:left|right|sides|sky|ceiling|floor|ground|feet)\b"
+    r"|\bturn(?:s|ed|ing)? (?:his|her|their|its|your|the) head (?:to the |over the )?(?:left|right)\b",
+    re.IGNORECASE,
+)
+"""What a sentence says of a head and no measure."""
+_ONLY = re.compile(r"nod|shak|shook|look|turn", re.IGNORECASE)
 KNOWN = "nods, shakes, looks left, right, up or down, and looks around"
 
 
@@ -82,3 +94,19 @@ def read_head(text: str) -> HeadMove:
         raise MotionloomError(f"a head {KNOWN}; {text.strip()[:60]!r} says none of these")
     left, up = np.sum(turns, axis=0).tolist()
     return HeadMove("looks", left * much, up * much, 0, pace)
+
+
+def head_said(text: str) -> HeadMove | None:
+    """What a sentence about somebody says of the head: "a man walks and looks around"; None for nothing.
+
+    How often and how quickly counts for a nod and a shake; of a look only the words of it do.
+    """
+    said = _SAID.search(text)
+    if said is None:
+        return None
+    return read_head(text if re.match(r"nod|sh", said[0], re.IGNORECASE) else said[0])
+
+
+def is_of_head(text: str, verb: str = "") -> bool:
+    """Whether a sentence says what a head does with its first verb (`motionloom.goals.remarks.verb_words`)."""
+    return head_said(text) is not None and _ONLY.match(verb) is not None

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motionloom.goals.contact import read_contact
+from motionloom.goals.heads import is_of_head
 from motionloom.goals.roles import MARK, prompts_of, without_two
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import in_plainer_verbs, subject_of
@@ -74,13 +75,15 @@ def remarks_on_two(
     return remarks + remarks_on([prompt for pair in prompts.values() for prompt in pair], known, encoder)
 
 
-def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> list[Remark]:
+def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, *, heads: bool = False) -> list[Remark]:
     """Remarks on texts that are not English, and on those that are like nothing in the table of what is known.
 
-    known: None where a weight file has no such table. The texts without a remark are left out. Raises `MotionloomError`
-    as the encoder does.
+    known: None where a weight file has no such table. heads: whether heads are turned as the words say, whatever is
+    known. The texts without a remark are left out. Raises `MotionloomError` as the encoder does.
     """
-    distinct = [text for text in dict.fromkeys(texts) if text.strip()]
+    distinct = [
+        text for text in dict.fromkeys(texts) if text.strip() and not (heads and is_of_head(text, *verb_words(text)))
+    ]
     english = [text for text in distinct if is_english(text)]
     remarks = [
         Remark(text, f"{text[:60]!r} does not look like English, and these weights know nothing else")

@@ -90,7 +90,8 @@ def remarks_of(models: Models, request: JobRequest) -> list[Remark]:
         return remarks_on_two(texts, models.block.known, prior.known, prior.text)
     read = [] if timeline is None or request.task != "generate" else [numbers_read(timeline), parts_read(timeline)]
     remarks = [Remark(request.prompt, line) for line in read if line]
-    return remarks + remarks_on(texts, prior.known, prior.text)
+    heads = request.task == "generate" and not request.values.literal
+    return remarks + remarks_on(texts, prior.known, prior.text, heads=heads)
 
 
 def batch_key(request: JobRequest) -> tuple[Any, ...] | None:

@@ -5,14 +5,14 @@ met; steps and repetitions are counted in the motion, and where the number diffe
 seed, with a shorter or longer way or stroke, `TRIES` times at most. What else the words say plainly
 (`motionloom.goals.expected`: a turn to the left, a wave, a kick of the right leg) is looked for in `ATTEMPTS` motions
 at most, of which all but the first have a common verb for each rare one ("walks" for "trudges"). The result is the one
-with the least missing.
+with the least missing. A head that nods, is shaken or looks aside is turned in it (`motionloom.goals.heads`).
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, Unpack
 
 import numpy as np
@@ -23,6 +23,7 @@ from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
 from motionloom.goals.expected import missing
+from motionloom.goals.heads import head_said
 from motionloom.goals.remarks import numbers_read, parts_read, remarks_on
 from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
@@ -31,6 +32,7 @@ from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED, SOLVER, Sampling, Settings
 from motionloom.tasks.control import control
+from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
@@ -138,7 +140,12 @@ class Worded:
         kinds = {
             kind_of_verb(word, last.text.lower()) for word in re.findall("[a-z]+", last.text.lower()) if base_of(word)
         }
-        if begin is None or kinds & {"state", "change"} or self.motion.seconds - begin < of * self.motion.seconds:
+        if (
+            head_said(last.text)
+            or begin is None
+            or kinds & {"state", "change"}
+            or self.motion.seconds - begin < of * self.motion.seconds
+        ):
             return ""
         return f"it ends standing still, from {begin:.1f} s on: what these weights do not know often does"
 
@@ -208,7 +215,7 @@ def generate_worded(
         progress=progress,
     )
     texts = [segment.text for one in timelines for segment in one.segments]
-    unknown = {one.text: one.line for one in remarks_on(texts, prior.known, prior.text)}
+    unknown = {one.text: one.line for one in remarks_on(texts, prior.known, prior.text, heads=not (literal or as_one))}
     return [
         replace(one, unknown={part.text: unknown[part.text] for part in one.timeline.segments if part.text in unknown})
         for one in motions
@@ -231,12 +238,44 @@ def generate_timelines(
     foot_lock, sampling: as of `motionloom.generate`, but that the sampling's ``seed`` and ``count`` are not looked at.
     Raises `MotionloomError` for an impossible request.
     """
-    sampling, done = sampling or Sampling(), 0
+    sampling = sampling or Sampling()
     if sampling.solver != SOLVER and any(len(one.segments) > 1 for one in timelines):
         raise MotionloomError(
             f"several actions one after the other are drawn with the solver {SOLVER} alone; got {sampling.solver}; "
             "choose that one, or leave the sentence whole (as_one)"
         )
+    sampled = _sampled_timelines(
+        prior,
+        timelines,
+        seeds=seeds,
+        attempts=attempts,
+        foot_lock=foot_lock,
+        sampling=sampling,
+        progress=progress,
+    )
+    yield from sampled if attempts == 1 else map(_with_heads, sampled)
+
+
+def _with_heads(one: Worded) -> Worded:
+    """The motion with a head that does what the words of each segment say of it (`motionloom.goals.heads`)."""
+    motion = one.motion
+    for segment, (first, last) in zip(one.timeline.segments, pairwise(one.timeline.begins), strict=True):
+        if move := head_said(segment.text):
+            motion = Nod(((first / FPS, last / FPS),), move=move).apply(None, motion, 0)
+    return one if motion is one.motion else replace(one, motion=motion)
+
+
+def _sampled_timelines(
+    prior: Prior,
+    timelines: Sequence[Timeline],
+    *,
+    seeds: Sequence[int],
+    attempts: int,
+    foot_lock: bool,
+    sampling: Sampling,
+    progress: Progress | None,
+) -> Iterator[Worded]:
+    done = 0
     how: dict[str, Any] = {"attempts": attempts, "foot_lock": foot_lock}
     for free, run in groupby(timelines, _is_free):
         several = list(run)
