@@ -89,11 +89,18 @@ export function readSeconds(text: string): number | null {
 const NEXT = /(?:[,;.]|\band|\bthen|\bbefore|\bafter)\s+(?:(?:and|then|also)\s+|\w+ly\s+)*([a-z]+)/g;
 const ENDS = listed("stop halt pause");
 
+/** What only ends each of several repetitions: "squats down and comes back up three times". */
+const COMES_UP = /\band (?:stand|come|get|go|rise|straighten)(?:e?s)? (?:right |straight )?(?:back )?up\b/;
+
 /** Whether a sentence says several actions one after the other, or may; a stop is only the end of one. */
 export function isSeveral(text: string): boolean {
-  const phrase = text.toLowerCase().trim();
+  const words = text.toLowerCase().trim();
+  const phrase = inDigits(words).search(PATTERNS.often) < 0 ? words : words.replace(COMES_UP, "");
   const next = [...phrase.matchAll(NEXT)].map(([, word]) => BASES.get(word!));
-  return /\bthen\b|[;.]\s+\S/.test(phrase) || next.some((verb) => verb !== undefined && !ENDS.has(verb));
+  return (
+    /\bthen\b|\b(?:moments?|seconds?|instant|while|bit) later\b|[;.]\s+\S/.test(phrase) ||
+    next.some((verb) => verb !== undefined && !ENDS.has(verb))
+  );
 }
 
 /** The words of one stroke of what is counted: "a person jumps" of "a person jumps three times". */
