@@ -49,7 +49,7 @@ def main() -> None:
         table.append([row[0], row[2], row[1], row[3], replaced])
         print(" ".join(f"{number:.2f}" for number in table[-1]), f"{rare} ({common})", flush=True)
     mean = np.mean(table, axis=0)
-    print(f"\n{len(table)} verbs: shown {mean[0]:.0%} as written, {mean[1]:.0%} by generate")
+    print(f"\n{len(table)} verbs: shown {mean[0]:.1%} as written, {mean[1]:.1%} by generate")
     print(f"at rest {mean[2]:.0%} as written, {mean[3]:.0%} by generate")
     print(f"replaced in {mean[4]:.0%} of the motions")
     [(name, mark)] = weight_marks([find_weights(arguments.weights)]).items()

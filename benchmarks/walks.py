@@ -1,4 +1,4 @@
-"""Whether walks differ: the spread of ten seeds of one sentence beside that of as many recorded people.
+"""Whether walks differ: the spread of ten seeds of one sentence beside that of recorded people.
 
     python benchmarks/walks.py SET [--seeds 10] [--weights default]
 
@@ -23,6 +23,7 @@ from motionloom_lab.suites.items import real_clips
 
 PROMPTS = ("a person walks", "a man is walking forward", "someone takes a walk")
 FRAMES, FPS = 40, 20.0
+HAND_KEYED = ("animated_drawings", "cat_soulslike", "kaykit", "mesh2motion", "quaternius")
 MANNERS = re.compile(
     r"back|side|turn|run|jog|sit|slow|fast|quick|brisk|sneak|march|limp|zombie|circle|carr|box|wav|stair|kick|arms"
     r"|jump|hop|curve|bend|pick|drunk|old|sad|strut|danc|uneven|climb|skip|cart"
@@ -50,8 +51,14 @@ def recorded(folder: Path) -> list[dict[str, float]]:
     people: dict[str, dict[str, float]] = {}
     for clip in real_clips(folder):
         text = " ".join(clip.captions).lower()
-        person = "_".join(clip.name.split("_")[: 1 if clip.name[0].isdigit() else 2])
-        if person in people or not re.search(r"\bwalk", text) or MANNERS.search(text):
+        name = clip.name.removeprefix("cmu_")
+        person = "_".join(name.split("_")[: 1 if name[0].isdigit() else 2])
+        if (
+            clip.source.startswith(HAND_KEYED)
+            or person in people
+            or not re.search(r"\bwalk", text)
+            or MANNERS.search(text)
+        ):
             continue
         for first in range(0, len(clip.positions) - FRAMES + 1, 10):
             p = np.asarray(clip.positions[first : first + FRAMES], dtype=np.float64)

@@ -244,37 +244,6 @@ def generate_timelines(
             f"several actions one after the other are drawn with the solver {SOLVER} alone; got {sampling.solver}; "
             "choose that one, or leave the sentence whole (as_one)"
         )
-    sampled = _sampled_timelines(
-        prior,
-        timelines,
-        seeds=seeds,
-        attempts=attempts,
-        foot_lock=foot_lock,
-        sampling=sampling,
-        progress=progress,
-    )
-    yield from sampled if attempts == 1 else map(_with_heads, sampled)
-
-
-def _with_heads(one: Worded) -> Worded:
-    """The motion with a head that does what the words of each segment say of it (`motionloom.goals.heads`)."""
-    motion = one.motion
-    for segment, (first, last) in zip(one.timeline.segments, pairwise(one.timeline.begins), strict=True):
-        if move := head_said(segment.text):
-            motion = Nod(((first / FPS, last / FPS),), move=move).apply(None, motion, 0)
-    return one if motion is one.motion else replace(one, motion=motion)
-
-
-def _sampled_timelines(
-    prior: Prior,
-    timelines: Sequence[Timeline],
-    *,
-    seeds: Sequence[int],
-    attempts: int,
-    foot_lock: bool,
-    sampling: Sampling,
-    progress: Progress | None,
-) -> Iterator[Worded]:
     done = 0
     how: dict[str, Any] = {"attempts": attempts, "foot_lock": foot_lock}
     for free, run in groupby(timelines, _is_free):
@@ -283,14 +252,27 @@ def _sampled_timelines(
             for begin in range(0, len(several), _TOGETHER):
                 some = several[begin : begin + _TOGETHER]
                 own = seeds[done : done + len(some)]
-                yield from _best_attempts(prior, some, seeds=own, sampling=sampling, progress=progress, **how)
+                best = _best_attempts(prior, some, seeds=own, sampling=sampling, progress=progress, **how)
+                yield from map(_with_heads, best)
                 done += len(some)
             continue
         for one in several:
-            yield _best_try(prior, one, sampling=replace(sampling, count=1), seed=seeds[done], **how)
+            best_try = _best_try(prior, one, sampling=replace(sampling, count=1), seed=seeds[done], **how)
+            yield _with_heads(best_try)
             done += 1
             if progress:
                 progress(done, len(timelines))
+
+
+def _with_heads(one: Worded) -> Worded:
+    """The motion with a head that does what the words of each segment say of it, where words are looked for at all."""
+    if one.attempts == 1:
+        return one
+    motion = one.motion
+    for segment, (first, last) in zip(one.timeline.segments, pairwise(one.timeline.begins), strict=True):
+        if move := head_said(segment.text):
+            motion = Nod(((first / FPS, last / FPS),), move=move).apply(None, motion, 0)
+    return one if motion is one.motion else replace(one, motion=motion)
 
 
 def _best_attempts(
