@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import sleep
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("starlette", reason="needs the extra 'studio'")
 pytest.importorskip("uvicorn", reason="needs the extra 'studio'")
 
+from motionloom.server.connections import Connection, H11Protocol
+from motionloom.server.limits import Limits
 from tests.server.serving import PATIENCE, Server, running
 
 UNFINISHED = b"GET /health HTTP/1.1\r\nHost: 127.0.0.1\r\nX-a: "
@@ -92,6 +95,25 @@ def test_who_holds_the_token_is_answered_while_others_take_every_place_they_can(
     request = f"GET /assets/{large.name} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
     with opened(small, 40, request):
         assert small.json("GET", "/capabilities", headers={"Authorization": f"Bearer {TOKEN}"})[0] == 200
+
+
+def test_who_comes_when_all_others_are_being_answered_makes_no_room_for_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[object] = []
+    monkeypatch.setattr(H11Protocol, "connection_made", lambda self, transport: None)
+    monkeypatch.setattr(Connection, "close", lambda self: closed.append(self))
+    waiting: dict[object, None] = {}
+
+    def comes() -> object:
+        one = Connection.__new__(Connection)
+        parts = {"_limits": Limits(connections=1), "_waiting": waiting, "_patience": None, "connections": {1, 2}}
+        vars(one).update(parts, loop=SimpleNamespace(call_later=lambda *_: None))
+        one.connection_made(None)
+        return one
+
+    first = comes()
+    assert (closed, list(waiting)) == ([], [first])
+    comes()
+    assert closed == [first], "who waited before makes room"
 
 
 def small_page() -> list[Path]:

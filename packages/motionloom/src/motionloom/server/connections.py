@@ -29,9 +29,9 @@ class Connection(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        self._wait()
         if len(self.connections) > self._limits.connections and self._waiting:
             next(iter(self._waiting)).close()
+        self._wait()  # not before: where all others are being answered, it would make room for itself
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._leave()
