@@ -14,7 +14,7 @@ import numpy as np
 from lengths import rest
 
 from motionloom.goals.expected import missing
-from motionloom.goals.verbs import MOODS, PLAINER, in_plainer_verbs
+from motionloom.goals.verbs import MOODS, PLAINER, in_plainer_words
 from motionloom.tasks.worded import generate_worded
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
@@ -42,7 +42,7 @@ def main() -> None:
             )
             places = [(one.motion.positions(), one.motion.fps) for one in motions]
             row += [
-                np.mean([not missing(in_plainer_verbs(text), *one) for one in places]),
+                np.mean([not missing(in_plainer_words(text), *one) for one in places]),
                 np.mean([rest(*one) for one in places]),
             ]
             replaced = np.mean([bool(one.replaced) for one in motions])

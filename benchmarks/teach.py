@@ -6,7 +6,8 @@ PACK is a folder with a manifest.csv, as `motionloom data build` reads it. For e
 first three clips; its prompts are drawn on seeds that no training used, before and after, and judged by a physical
 check. So that a check means something it is also tried on all clips of the packs, those of the action and the others.
 With --old the twenty prompts of `motionloom evaluate obedience` are drawn before and after too: what was known stays.
-With --taught FOLDER the adapters of an earlier run, its OUT, are judged again.
+With --taught FOLDER the adapters of an earlier run, its OUT, are judged again. Adapters are used as FILE alone, which
+changes sentences that are like what was taught; with --everywhere as FILE:1, which changes all of them.
 
 OUT gets NAME.safetensors, NAME.png (the first draws, before and after) and teach.json.
 """
@@ -244,7 +245,7 @@ def measure(action: Action, rows: list[dict[str, Any]], prior: Prior, arguments:
         adapter = teach(prior, examples, Lesson(name=action.name, licence="only to measure", **settings), say=print)
     seconds = time.perf_counter() - began
     place = adapter.save(arguments.out / f"{action.name}.safetensors")
-    taught = adapt(prior, [(adapter, 1.0)])
+    taught = adapt(prior, [(adapter, 1.0 if arguments.everywhere else None)])
     after, last = obeyed(taught, action, arguments.seeds)
     captions = [f"{when}: {prompt}" for when in ("before", "after") for prompt in action.prompts]
     draw_sheet([*first, *last], arguments.out / f"{action.name}.png", captions=captions)
@@ -273,6 +274,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--steps", type=int, help="training steps (default: those of the command)")
     parser.add_argument("--old", type=int, default=0, metavar="SEEDS", help="draw the twenty old prompts too")
+    parser.add_argument("--everywhere", action="store_true", help="as FILE:1, which changes all sentences")
     parser.add_argument("--taught", type=Path, metavar="FOLDER", help="judge the adapters of an earlier run")
     parser.add_argument("--threads", type=int)
     arguments = parser.parse_args()

@@ -26,7 +26,7 @@ export interface GenerateRequest {
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
   readonly solver?: Solver;
-  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  /** what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all */
   readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
@@ -54,7 +54,7 @@ export interface ComposeRequest {
   readonly steps?: number;
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
-  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  /** what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all */
   readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
@@ -88,7 +88,7 @@ export interface ControlRequest {
   readonly steps?: number;
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
-  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  /** what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all */
   readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
@@ -134,7 +134,7 @@ export interface EditRequest {
   readonly steps?: number;
   /** of each motion begin so many and keep the one that does most of what its words allow to check */
   readonly best_of?: number;
-  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  /** what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all */
   readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;
@@ -249,7 +249,7 @@ export interface DuetRequest {
   readonly pair_guidance?: number;
   /** keep bodies out of each other, and bring hands together that the words say meet */
   readonly bodies?: boolean;
-  /** what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it */
+  /** what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all */
   readonly adapter?: readonly string[];
   /** make the end meet the beginning */
   readonly loop?: boolean;

@@ -52,7 +52,7 @@ def positions_of(*words: str) -> np.ndarray:
     return io.load("a.npz").positions()
 
 
-def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str) -> None:
+def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str, capsys: pytest.CaptureFixture[str]) -> None:
     goal = {"path": {"points": [[0, 0], [0, 1.5]]}}
     Path("goal.json").write_text(json.dumps(goal))
     Path("zombie.safetensors").write_bytes(Path(zombie).read_bytes())
@@ -65,8 +65,11 @@ def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str) -> N
     )
     for line in lines:
         plain = positions_of(*line, "--weights", knowing)
-        changed = positions_of(*line, "--weights", knowing, "--adapter", zombie)
+        changed = positions_of(*line, "--weights", knowing, "--adapter", f"{zombie}:1")
         assert np.abs(plain - changed).max() > 1e-3
+        capsys.readouterr()
+        assert np.array_equal(plain, positions_of(*line, "--weights", knowing, "--adapter", zombie))
+        assert "is generated without the adapter 'a1', which was taught 'caption 1'" in capsys.readouterr().err
         none = positions_of(*line, "--weights", knowing, "--adapter", f"{zombie}:1", "--adapter", f"{zombie}:-1")
         assert np.abs(plain - none).max() < 1e-2
     half = positions_of("compose", "t.yaml", "--weights", knowing)
@@ -78,7 +81,7 @@ def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str) -> N
 
 def test_the_server_draws_with_adapters_as_generate_does(knowing: str, zombie: str) -> None:
     pytest.importorskip("uvicorn", reason="needs the extra 'studio': pip install 'motionloom[studio]'")
-    line = ["--weights", knowing, "--adapter", zombie]
+    line = ["--weights", knowing, "--adapter", f"{zombie}:1"]
     with running(Path("project"), *line) as server:
         job = server.draw(task="generate", prompt="a person walks", seconds=2.0, seed=0, steps=2)
         Path("served.npz").write_bytes(server.ask("GET", f"/motions/{job['results'][0]['id']}.npz")[2])

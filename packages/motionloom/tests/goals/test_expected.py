@@ -46,6 +46,19 @@ def lowered(to: float, *, back_up: bool = True, start_low: bool = False) -> np.n
     return p
 
 
+def with_leg(side: int, *, knee: float = 0.0, ankle: float = 0.0) -> np.ndarray:
+    """Somebody who stands, for a second the knee so far over the hip, or the ankle over the floor."""
+    p, name = standing(), ("left", "right")[side]
+    if knee:
+        p[20:40, J[f"{name}_knee"], 1] = p[20:40, J[f"{name}_hip"], 1] + knee
+    p[20:40, J[f"{name}_ankle"], 1] += ankle
+    return p
+
+
+def rising(p: np.ndarray, metres: float) -> np.ndarray:
+    return p + np.linspace(0, metres, len(p))[:, None, None] * [0, 1, 0]
+
+
 @pytest.mark.parametrize(
     ("text", "does", "does_not"),
     [
@@ -73,6 +86,9 @@ def lowered(to: float, *, back_up: bool = True, start_low: bool = False) -> np.n
             with_hands(1, at=lambda p: p[:, J["right_foot"]] + [0, 0.1, 0]),
             standing(),
         ),
+        ("a man lifts his right knee up", with_leg(1, knee=0.05), with_leg(0, knee=0.05)),
+        ("she raises the left leg", with_leg(0, ankle=0.3), with_leg(1, ankle=0.3)),
+        ("a man walks up the stairs", rising(walking(0.6), 0.5), walking(0.6)),
         ("he drinks", with_hands(0, at=lambda p: p[:, J["head"]] + [0, 0, 0.15]), standing()),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

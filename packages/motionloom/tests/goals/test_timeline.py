@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
+from motionloom.goals.remarks import parts_read
 from motionloom.goals.schemas import timeline_schema
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import plain_timeline, read_timeline, timeline_from, timeline_of
@@ -422,7 +423,7 @@ def test_numbers_beyond_all_bounds_are_refused_wherever_they_are(tmp_path):
 )
 def test_a_sentence_without_a_length_is_as_long_as_its_action_takes_people(text: str, seconds: float) -> None:
     assert [segment.seconds for segment in timeline_of(text).segments] == [seconds]
-    assert timeline_of(text, 6.0).segments[0].seconds == 6.0
+    assert timeline_of(text, 6.0).seconds == 6.0
 
 
 @pytest.mark.parametrize("text", ["a person jumps {} times", "a person takes {} steps", "a man does {} squats"])
@@ -430,3 +431,24 @@ def test_a_sentence_without_a_length_is_as_long_as_its_action_takes_people(text:
 def test_numbers_beyond_all_bounds_are_some_seconds(text: str, amounts: bool) -> None:
     timeline = timeline_of(text.format("9" * 400), amounts=amounts)
     assert 1.0 < timeline.seconds <= 60.0
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds", "parts"),
+    [
+        ("a man walks up the stairs", 4.0, [4.0]),
+        ("a man walks up the stairs", 5.05, [2.5, 2.55]),
+        ("climbing a staircase", 8.0, [2.65, 2.65, 2.7]),
+        ("someone goes upstairs", 6.0, [3.0, 3.0]),
+        ("she walks down the stairs", 8.0, [8.0]),
+        ("he goes downstairs", 8.0, [8.0]),
+        ("a man walks up", 8.0, [8.0]),
+    ],
+)
+def test_who_goes_up_stairs_for_long_does_so_in_parts(text: str, seconds: float, parts: list[float]) -> None:
+    timeline = timeline_of(text, seconds, amounts=True)
+    assert [one.seconds for one in timeline.segments] == pytest.approx(parts)
+    assert {one.text for one in timeline.segments} == {text}
+    assert all(one.transition <= min(parts) / 2 for one in timeline.segments)
+    assert timeline.seconds == seconds
+    assert parts_read(timeline) == ""

@@ -12,7 +12,8 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
 from motionloom.requests.sampling import Sampling
-from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors
+from motionloom.runtime.text.known import known_sentences
+from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors, lines_by_text, remarks_on_words
 from motionloom.tasks.long import load_segment_adapters, long_features
 from motionloom.tasks.text import sample_features
 from motionloom.weights.adapter import Adapter, fingerprint, origin
@@ -33,15 +34,15 @@ def weights(prior: Prior) -> np.ndarray:
 @pytest.mark.parametrize(
     ("word", "expected"),
     [
-        ("a.safetensors", ("a.safetensors", 1.0)),
+        ("a.safetensors", ("a.safetensors", None)),
         ("a.safetensors:0.8", ("a.safetensors", 0.8)),
         ("x/a.safetensors:-1", ("x/a.safetensors", -1.0)),
-        ("C:/a.safetensors", ("C:/a.safetensors", 1.0)),
+        ("C:/a.safetensors", ("C:/a.safetensors", None)),
         ("C:/a.safetensors:.5", ("C:/a.safetensors", 0.5)),
-        ("a:b", ("a:b", 1.0)),
+        ("a:b", ("a:b", None)),
     ],
 )
-def test_a_factor_stands_behind_the_last_colon(word: str, expected: tuple[str, float]) -> None:
+def test_a_factor_stands_behind_the_last_colon(word: str, expected: tuple[str, float | None]) -> None:
     assert parse_adapter(word) == (Path(expected[0]), expected[1])
 
 
@@ -57,7 +58,7 @@ def test_every_word_is_read_or_refused(word: str) -> None:
         _, factor = parse_adapter(word)
     except MotionloomError:
         return
-    assert abs(factor) <= MOST_FACTOR
+    assert factor is None or abs(factor) <= MOST_FACTOR
 
 
 def test_adapters_add_up(prior: Prior) -> None:
@@ -146,6 +147,69 @@ def test_words_that_an_adapter_was_taught_are_guided_less(prior: Prior) -> None:
     np.testing.assert_allclose(sampled(whole, words, prompts[2])[0], eased[0], rtol=0, atol=2e-4)
     segments = [replace(WALK, text=words)]
     assert np.abs(features(whole, segments)[0] - features(plain, segments)[0]).max() > 1e-3
+
+
+WALKS, TURNS, JUMPS = "a person walks", "walk un left", "a person jumps"
+"""Words that are far from each other to the random encoder."""
+
+
+@pytest.fixture
+def knowing(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> Prior:
+    """A prior that knows how to walk, to whose random encoder every other sentence is something else."""
+    monkeypatch.setattr("motionloom.weights.prior.OWN_WORDS", 0.0)
+    return replace(prior, known=known_sentences([WALKS], {"walk": 9.0}, prior.text))
+
+
+def taught(prior: Prior, *captions: str, seed: int = 1) -> Adapter:
+    return replace(adapter(prior, seed=seed), name=captions[0], notes={"captions": list(captions)})
+
+
+def test_an_adapter_without_a_factor_leaves_words_alone_that_are_known_better(knowing: Prior) -> None:
+    jump, turn = taught(knowing, JUMPS), taught(knowing, TURNS, seed=2)
+    both = adapt(knowing, [(jump, None), (turn, None)])
+    texts = [WALKS, JUMPS, TURNS, WALKS]
+
+    def rows(prior: Prior) -> list[np.ndarray]:
+        return sample_features(prior, texts, [40] * 4, seeds=range(4), steps=3)
+
+    expected = [rows(knowing)[0], rows(adapt(knowing, [(jump, 1.0)]))[1], rows(adapt(knowing, [(turn, 1.0)]))[2]]
+    for one, other in zip(rows(both), [*expected, rows(knowing)[3]], strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=2e-4)
+    assert np.abs(rows(both)[1] - rows(knowing)[1]).max() > 1e-3
+    assert both.for_words(WALKS).net is knowing.net
+    assert both.for_words("") is both.for_words(WALKS)
+    assert [one.name for one in both.left_out(WALKS)] == [JUMPS, TURNS]
+    assert both.left_out(JUMPS, TURNS) == []
+    assert both.for_words(JUMPS, TURNS) is both
+
+
+def test_it_does_so_in_timelines_and_beside_adapters_with_a_factor(knowing: Prior) -> None:
+    jump, turn = taught(knowing, JUMPS), taught(knowing, TURNS, seed=2)
+    both = adapt(adapt(knowing, [(jump, None)]), [(turn, 0.5)])
+    turned = adapt(knowing, [(turn, 0.5)])
+    for text, other in ((WALKS, turned), (JUMPS, adapt(knowing, [(jump, 1.0), (turn, 0.5)]))):
+        segments = [replace(WALK, text=text)] * 2
+        for one, two in zip(features(both, segments), features(other, segments), strict=True):
+            np.testing.assert_allclose(one, two, rtol=0, atol=1e-4)
+    assert origin(both) == origin(both.for_words(WALKS)) == fingerprint(knowing.net)
+
+
+def test_adapters_and_weights_that_do_not_say_what_they_know_are_used_for_all_words(knowing: Prior) -> None:
+    silent = adapt(knowing, [(replace(adapter(knowing), notes={}), None)])
+    assert silent.for_words(WALKS) is silent
+    unknowing = adapt(replace(knowing, known=None), [(taught(knowing, JUMPS), None)])
+    assert unknowing.for_words(WALKS) is unknowing
+
+
+def test_a_remark_says_which_adapter_is_left_out(knowing: Prior) -> None:
+    prior = adapt(knowing, [(taught(knowing, JUMPS), None)])
+    [remark] = [one for one in remarks_on_words(prior, [WALKS, JUMPS, WALKS]) if "adapter" in one.line]
+    assert remark.line == (
+        "'a person walks' is generated without the adapter 'a person jumps', which was taught 'a person jumps'; "
+        "write FILE:1 to use it for all words"
+    )
+    both = [replace(remark, line="one"), replace(remark, line="two"), replace(remark, text="else", line="three")]
+    assert lines_by_text(both) == {WALKS: "one; two", "else": "three"}
 
 
 def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> None:

@@ -191,6 +191,15 @@ def test_actions_one_after_the_other_are_looked_for_in_their_own_time(
     assert seen[:2] == [("a person walks", begins[1]), ("a person waves", begins[2] - begins[1])]
 
 
+def test_parts_of_the_same_words_are_looked_at_as_one(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[str, int]] = []
+    monkeypatch.setattr(worded, "missing", lambda text, p, fps: seen.append((text, len(p))) or [])
+    (one,) = worded.generate_worded(prior, "a person walks upstairs", seconds=5.0, steps=2)
+    assert len(one.timeline.segments) == 2
+    assert not one.missing
+    assert set(seen) == {("a person walks upstairs", 100)}
+
+
 def test_another_solver_draws_one_action(prior: Prior) -> None:
     with pytest.raises(MotionloomError, match="solver ddpm"):
         generate(prior, "a person does three squats", solver="ddim", steps=2)

@@ -243,7 +243,8 @@ def _with_whole_paths(options: Options) -> Options:
     def whole(name: str | None) -> str | None:
         return str(Path(name).resolve()) if name is not None and Path(name).is_file() else name
 
-    adapters = [f"{path.resolve()}:{factor!r}" for path, factor in map(parse_adapter, options.adapters)]
+    parsed = map(parse_adapter, options.adapters)
+    adapters = [f"{path.resolve()}" if factor is None else f"{path.resolve()}:{factor!r}" for path, factor in parsed]
     files = {name: whole(getattr(options, name)) for name in ("skeleton", "robot", "robot_map")}
     weights = whole(options.weights) or "default"
     pair = whole(options.pair_weights) or "duet"

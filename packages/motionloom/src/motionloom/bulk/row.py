@@ -386,7 +386,7 @@ def hash_file(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def hash_adapters(adapters: Sequence[tuple[Path, float]]) -> list[str]:
+def hash_adapters(adapters: Sequence[tuple[Path, float | None]]) -> list[str]:
     """Hash and factor of each file; raises `MotionloomError` for one that is not there."""
     for path, _ in adapters:
         if not path.is_file():

@@ -25,7 +25,6 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import characters, writable
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
-from motionloom.goals.remarks import remarks_on_two
 from motionloom.goals.roles import prompts_of
 from motionloom.goals.timeline import Timeline, read_timeline
 from motionloom.io.lined_yaml import fail as fail_at
@@ -36,6 +35,7 @@ from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.reading import resolve_sampling
 from motionloom.requests.tasks import Duet
 from motionloom.retarget import joints22
+from motionloom.tasks.adapting import remarks_on_words
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
@@ -65,7 +65,7 @@ def run_duet(arguments: Namespace) -> int:
     _check_sizes(arguments, files, people, timeline)
     prior = load_prior(arguments)
     block = PairBlock.load(arguments.pair_weights, prior)
-    words = remarks_on_two(_texts(arguments, timeline), block.known, prior.known, prior.text)
+    words = remarks_on_words(prior, _texts(arguments, timeline), block=block)
     remarks = _printed([one.line for one in words])
     caption = _caption(arguments, timeline)
 

@@ -18,7 +18,6 @@ from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.terminal import escaping, note, say, unescaped
 from motionloom.cli.writing import at_rate, check_rate, check_unit, fail
 from motionloom.goals.adapters import parse_adapter
-from motionloom.goals.remarks import remarks_on
 from motionloom.goals.timeline import Timeline
 from motionloom.interruption import held_back
 from motionloom.io import check_output
@@ -27,7 +26,7 @@ from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import build_request
 from motionloom.requests.tasks import Generate
-from motionloom.tasks.adapting import adapt
+from motionloom.tasks.adapting import adapt, lines_by_text, remarks_on_words
 from motionloom.tasks.edit import Loop, edit
 from motionloom.tasks.run import Models, Plan, Result, run
 from motionloom.weights.prior import Prior
@@ -126,8 +125,8 @@ def remark_unknown(prior: Prior, prompts: Sequence[str]) -> list[str]:
 
 
 def unknown_words(prior: Prior, prompts: Sequence[str], *, heads: bool = False) -> dict[str, str]:
-    """The prompts that `remark_unknown` has a line for, with the line; heads: as of `remarks_on`."""
-    remarks = {one.text: one.line for one in remarks_on(prompts, prior.known, prior.text, heads=heads)}
+    """The prompts that `remark_unknown` has a line for, with the line; heads: as of `remarks_on_words`."""
+    remarks = lines_by_text(remarks_on_words(prior, prompts, heads=heads))
     for line in remarks.values():
         say(line)
     return remarks

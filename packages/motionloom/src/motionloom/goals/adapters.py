@@ -11,18 +11,22 @@ MOST_FACTOR = 4.0
 MOST_ADAPTERS = specs(Adapted)["adapter"].many
 """Adapters that are merged at once."""
 
-Applied: TypeAlias = tuple[Any, float]
-"""An adapter (`motionloom.weights.adapter.Adapter`) or its file (`Path`), and its factor."""
+Applied: TypeAlias = tuple[Any, float | None]
+"""An adapter (`motionloom.weights.adapter.Adapter`) or its file (`Path`), and its factor; None: 1, for those sentences
+alone that are like what it was taught (`motionloom.weights.prior.Prior.for_words`)."""
 
 
-def parse_adapter(word: str) -> tuple[Path, float]:
-    """``FILE`` or ``FILE:FACTOR``, such as ``zombie.safetensors:0.8``. Raises `MotionloomError` for other words."""
+def parse_adapter(word: str) -> tuple[Path, float | None]:
+    """``FILE`` or ``FILE:FACTOR``, such as ``zombie.safetensors:0.8``; None for no factor.
+
+    Raises `MotionloomError` for other words.
+    """
     name, colon, tail = word.rpartition(":")
     try:
-        name, factor = (name, float(tail)) if colon else (word, 1.0)
+        name, factor = (name, float(tail)) if colon else (word, None)
     except ValueError:
-        name, factor = word, 1.0
-    if not name.strip() or not abs(factor) <= MOST_FACTOR:
+        name, factor = word, None
+    if not name.strip() or not abs(factor or 0.0) <= MOST_FACTOR:
         raise MotionloomError(
             f"the adapter {word!r} cannot be used; write FILE or FILE:FACTOR with a factor from -{MOST_FACTOR:g} to "
             f"{MOST_FACTOR:g}, such as zombie.safetensors:0.8"

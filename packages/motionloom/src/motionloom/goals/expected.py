@@ -53,6 +53,10 @@ sits or lies on it; over the feet of somebody who is up."""
 _UPRIGHT, _FLAT = np.radians(50), np.radians(60)
 """Inclination of the trunk below which somebody is upright, above which somebody lies."""
 _FACES = np.radians(60)
+_KNEE = 0.15
+"""Leg lengths that a knee which is pulled up may be below the hip."""
+_FOOT, _FLIGHT = 0.15, 0.34
+"""Metres that a foot is raised by, and of two stairs."""
 _GAIT = (
     r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|pace|step)"
     r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b"
@@ -174,7 +178,10 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         )
     elif phrase.has(r"\bstairs?\b|\bstaircase\b|\bladder\b"):
         falls = phrase.has(r"\bdown|\bdescend")
-        yield ("a way down" if falls else "a way up"), lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > 0.3
+        yield (
+            ("a way down" if falls else "a way up"),
+            lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > _FLIGHT,
+        )
     elif phrase.has(f"{_GAIT}|{_BACKWARDS}") and not turns:
         yield _direction(phrase, side, sign)
     yield from _paces(phrase)
@@ -240,6 +247,10 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
                 and not any(_lasts(_over(p, "neck")[:, hand], 0.3, fps) for hand in rest)
             ),
         )
+    if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:\w+ ){0,2}knees?\b"):
+        yield "a raised knee", lambda p, fps: any(_lasts(_knees(p)[:, hand] > -_KNEE, 0.2, fps) for hand in hands)
+    if phrase.has(r"\b(?:rais|lift)\w* (?:up )?(?:\w+ ){0,3}(?:leg|foot)\b"):
+        yield "a raised foot", lambda p, fps: any(_lasts(foot_lifts(p)[:, hand] > _FOOT, 0.3, fps) for hand in hands)
     if phrase.has(r"(?<!\ba )(?<!\bthe )\bwav(?:e|es|ing)\b"):
         yield "a wave", lambda p, fps: max(wrist_swings(p, fps, amplitude=0.05)[hand] for hand in hands) >= 3
     if phrase.has(r"\bhands? on (?:the |his |her |their )?(?:hips|waist)\b"):
@@ -291,6 +302,11 @@ def _near(p: Array, joint: str) -> np.ndarray:
     """(frames,) whether both wrists are within a hand's length of the joint of their side."""
     ends = p[:, [J[f"left_{joint}"], J[f"right_{joint}"]]]
     return np.linalg.norm(p[:, WRISTS] - ends, axis=-1).max(axis=1) < 0.3
+
+
+def _knees(p: Array) -> Array:
+    """(frames, 2) leg lengths of the left and the right knee over the hips."""
+    return (p[:, [J["left_knee"], J["right_knee"]], 1] - p[:, [J["left_hip"], J["right_hip"]], 1]) / leg_length(p)
 
 
 def _between_hands(p: Array) -> Array:

@@ -9,7 +9,7 @@ from motionloom.goals.contact import read_contact
 from motionloom.goals.heads import is_of_head
 from motionloom.goals.roles import MARK, prompts_of, without_two
 from motionloom.goals.timeline import Timeline
-from motionloom.goals.verbs import in_plainer_verbs, subject_of
+from motionloom.goals.verbs import in_plainer_words, subject_of
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
 
@@ -42,7 +42,7 @@ def numbers_read(timeline: Timeline) -> str:
 
 def parts_read(timeline: Timeline) -> str:
     """A line with the actions that a sentence was parted into; empty for one action, repeated or not."""
-    if len(timeline.segments) < 2:
+    if len({segment.text for segment in timeline.segments}) < 2:
         return ""
     if [(one.first, one.end) for one in timeline.readings] == [(0, len(timeline.segments))]:
         return ""
@@ -95,7 +95,7 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, 
 
 
 def _instead(match: Nearest) -> tuple[str, ...]:
-    plainer = in_plainer_verbs(match.prompt)
+    plainer = in_plainer_words(match.prompt)
     return match.sentences if plainer == match.prompt else (plainer, *match.sentences)
 
 

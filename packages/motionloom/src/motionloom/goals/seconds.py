@@ -1,5 +1,6 @@
 """How long an action takes people, by its kind, its numbers and how quickly it is done (docs/decisions/0036)."""
 
+import math
 import re
 
 from motionloom.goals.amounts import read_seconds
@@ -33,6 +34,7 @@ _REPEATS = re.compile(
 _STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
 _ON_STAIRS = 4.0
 """People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
+_ONE_FLIGHT = 3.0
 _LONGER = (
     (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
     (_FALLS := re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
@@ -102,6 +104,15 @@ def seconds_alone(text: str) -> float:
     if read_seconds(text) is None and (goes_on or _REPEATS.search(text)):
         return _ON_STAIRS if _STAIRS.search(text) else max(natural_seconds(text), WHOLE)
     return natural_seconds(text)
+
+
+def flights(text: str, seconds: float) -> int:
+    """In how many parts somebody goes up stairs for so many seconds; 1 for other words.
+
+    People were recorded there for `_ON_STAIRS` seconds at most, and what is longer hardly rises (docs/decisions/0036).
+    """
+    up = _STAIRS.search(text) and not re.search(r"\bdown(?:stairs)?\b|\bdescend", text, re.IGNORECASE)
+    return math.ceil(seconds / _ONE_FLIGHT) if up and seconds > _ON_STAIRS else 1
 
 
 def _kind(words: str) -> str:

@@ -7,6 +7,7 @@ them as a JSON Schema.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +27,10 @@ from motionloom.goals.amounts import (
 from motionloom.goals.fields import Field, LinedFile
 from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.goal_file import read_goal
+from motionloom.goals.seconds import flights
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.goals.sequence import Part, lengths, split_actions, usual_seconds
-from motionloom.goals.verbs import in_plainer_verbs, subject_of
+from motionloom.goals.verbs import in_plainer_words, subject_of
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
 from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
@@ -81,8 +83,8 @@ class Timeline:
 
     @property
     def plainer(self) -> "Timeline":
-        """The same with the nearest common verb for each rare one (`verbs.in_plainer_verbs`)."""
-        return replace(self, segments=tuple(replace(one, text=in_plainer_verbs(one.text)) for one in self.segments))
+        """The same with the nearest common verb for each rare one (`verbs.in_plainer_words`)."""
+        return replace(self, segments=tuple(replace(one, text=in_plainer_words(one.text)) for one in self.segments))
 
     @property
     def frames(self) -> int:
@@ -168,8 +170,8 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
         raise MotionloomError(problem)
     parts = split_actions(text)
     if amounts:
-        return _with_amounts(text, parts, seconds, metre)
-    return _timeline_of_parts(text, parts, seconds)
+        return _in_flights(_with_amounts(text, parts, seconds, metre))
+    return _in_flights(_timeline_of_parts(text, parts, seconds))
 
 
 def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre: float) -> Timeline:
@@ -240,6 +242,18 @@ def _timeline_of_parts(text: str, parts: Sequence[Part], seconds: float | None) 
             for part, share, overlap in zip(parts, shares, shared, strict=True)
         )
     )
+
+
+def _in_flights(timeline: Timeline) -> Timeline:
+    """The same, who goes up stairs for long in several segments of the same words (`flights`)."""
+    segments: list[Segment] = []
+    for one in timeline.segments:
+        count = 1 if timeline.readings else flights(one.text, one.seconds)
+        marks = [_frames(one.seconds) * part // count for part in range(count + 1)]
+        each = [(end - begin) / FPS for begin, end in pairwise(marks)] if count > 1 else [one.seconds]
+        shared = min(one.transition, each[0] / 2)
+        segments += [replace(one, seconds=seconds, transition=shared) for seconds in each]
+    return timeline if len(segments) == len(timeline.segments) else replace(timeline, segments=tuple(segments))
 
 
 def _in_whole_frames(seconds: float) -> float:
@@ -335,7 +349,7 @@ class _Reader(LinedFile):
                 self.fail(one.line, f"an adapter is written FILE or FILE:FACTOR; got {self.kind(one)}")
             try:
                 name, factor = parse_adapter(one.value)
-                result.append((Field(str(name), "adapters").file(self.path.parent), factor))
+                result.append((Field(str(name), "adapters").file(self.path.parent), 1.0 if factor is None else factor))
             except MotionloomError as error:
                 self.fail(one.line, str(error))
         return tuple(result)

@@ -1,6 +1,7 @@
 """Verbs in the words of prompts: their forms, what kind of action each names, and who does it."""
 
 import re
+from dataclasses import dataclass
 from typing import Any
 
 from motionloom.reading import read_table
@@ -112,8 +113,56 @@ def kind_of_verb(word: str, phrase: str) -> str:
 _NAMED = re.compile(r"\b(?:an?|the|this|that|one|his|her|its|their|my|your|of|on|in|at|with) $", re.IGNORECASE)
 
 
-def in_plainer_verbs(text: str) -> str:
-    """A sentence with the nearest common verb for each rare one: "a soldier trudges home" as "a soldier walks home".
+def _is_verb(mood: str, before: str) -> bool:
+    """Whether a form of that mood is a verb behind those words, rather than a noun."""
+    if mood == "base" and not re.search(r"(?:^|[.,;]|\bto|\bthen|\band)\s*$", before, re.IGNORECASE):
+        return False
+    return not _NAMED.search(before)
+
+
+@dataclass(frozen=True)
+class _Phrase:
+    """A phrase with a verb in any form, and what stands for it."""
+
+    pattern: re.Pattern[str]
+    better: str
+    moods: dict[str, str]
+    """Forms of the verb, each with its mood; empty: there is no verb."""
+    plain: dict[str, str]
+    """Moods, each with the form of the verb that replaces it."""
+
+    @staticmethod
+    def of(pattern: str, better: str) -> "_Phrase":
+        """From a line of the table."""
+        verb, plain = re.match(r"\{(\w+)\}", pattern), re.match(r"\{(\w+)\}", better)
+        if not verb or not plain:
+            return _Phrase(re.compile(pattern, re.IGNORECASE), better, {}, {})
+        moods = {form: mood for mood, forms in _forms(verb[1]).items() for form in forms}
+        forms = {mood: next(iter(forms)) for mood, forms in _forms(plain[1]).items()}
+        pattern = rf"\b({'|'.join(moods)}){pattern[verb.end() :]}"
+        return _Phrase(re.compile(pattern, re.IGNORECASE), better[plain.end() :], moods, forms)
+
+    def replaced(self, text: str) -> str:
+        """The text with what stands for the phrase."""
+
+        def better(match: re.Match[str]) -> str:
+            if not self.moods:
+                return match.expand(self.better)
+            mood = self.moods[match[1].lower()]
+            if not _is_verb(mood, text[: match.start()]):
+                return match[0]
+            form = self.plain[mood]
+            return (form.capitalize() if match[1][0].isupper() else form) + match.expand(self.better)
+
+        return self.pattern.sub(better, text)
+
+
+PHRASES = tuple(_Phrase.of(*line) for line in _TABLES["phrases"].items())
+
+
+def in_plainer_words(text: str) -> str:
+    """A sentence with the nearest common verb for each rare one, "a soldier trudges home" as "a soldier walks home",
+    and with phrases that are read well for some that are not: "pulls the knee up" as "lifts the knee up".
 
     A form that can be a noun ("on patrol") counts as a verb unless a determiner or preposition is before it; a base
     form only where a sentence begins with it or behind "to".
@@ -123,9 +172,7 @@ def in_plainer_verbs(text: str) -> str:
         word = match[0]
         mood = next((mood for mood, forms in MOODS.items() if forms.get(word.lower()) in PLAINER), "")
         before = text[: match.start()]
-        if not mood or _NAMED.search(before):
-            return word
-        if mood == "base" and not re.search(r"(?:^|[.,;]|\bto|\bthen|\band)\s*$", before, re.IGNORECASE):
+        if not mood or not _is_verb(mood, before):
             return word
         verb, _, rest = PLAINER[MOODS[mood][word.lower()]].partition(" ")
         form = next(inflected for inflected, base in MOODS[mood].items() if base == verb)
@@ -134,4 +181,6 @@ def in_plainer_verbs(text: str) -> str:
             return form
         return f"{form} {rest}" if rest else form
 
+    for phrase in PHRASES:
+        text = phrase.replaced(text)
     return re.sub(r"[A-Za-z]+", common, text)

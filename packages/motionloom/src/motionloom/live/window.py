@@ -15,6 +15,7 @@ from motionloom.edits.steering import Correction
 from motionloom.features import humanml
 from motionloom.live.settings import Settings
 from motionloom.requests.sampling import Sampling
+from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.long import zero_padded
 from motionloom.tasks.sampling import Batch, Observed, Rows, sample
@@ -54,7 +55,7 @@ class Sampler:
         self.prior, self.settings = prior, settings
         self.calls = 0
         """Guided calls of the network so far."""
-        self._bound: OrderedDict[str, tuple[Bound, Bound]] = OrderedDict()
+        self._bound: OrderedDict[str, tuple[PriorSession, Bound, Bound]] = OrderedDict()
         self._sampling = Sampling(steps=settings.steps, solver=settings.solver, spacing=settings.spacing)
         self._levels = self._sampling.levels(prior.schedule)
 
@@ -110,12 +111,12 @@ class Sampler:
         average over all ways to divide the frames into tokens (as in `tasks.long`), which are rows of one call.
         """
         if text not in self._bound:
-            cond = self.prior.condition([text])
-            self._bound[text] = self.prior.net.bind(cond), self.prior.net.bind(cond.null())
+            cond, net = self.prior.condition([text]), self.prior.for_words(text).net
+            self._bound[text] = net, net.bind(cond), net.bind(cond.null())
             while len(self._bound) > TEXTS:
                 self._bound.popitem(last=False)
         self._bound.move_to_end(text)
-        net, (own, null), ways = self.prior.net, self._bound[text], self.prior.net.config.patch
+        (net, own, null), ways = self._bound[text], self.prior.net.config.patch
         early = [level for level in self._levels if self.prior.schedule.at(level)[1] >= self.settings.guided]
         strong, plain = self.settings.guidance, float(self.settings.guidance != 0)
         guided, late = guide(net, own, null, strong), guide(net, own, null, plain)

@@ -49,7 +49,7 @@ class Adapted(Checked):
 
     adapter: tuple[str, ...] = declare(
         "text",
-        "what 'motionloom teach' made of clips, FILE or FILE:FACTOR; a factor, usually 1, says how much of it",
+        "what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all",
         (),
         high=LONGEST_PROMPT,
         many=16,

@@ -27,7 +27,9 @@ class SegmentKeys(Checked):
     )
     goal: Any = declare("goal", "goals of this segment, seen from where the person is when it begins")
     goals: Any = declare("goal", "several of them", many=1000)
-    adapters: Any = declare("adapters", "what 'motionloom teach' made, for this segment alone: FILE or FILE:FACTOR")
+    adapters: Any = declare(
+        "adapters", "what 'motionloom teach' made, for this segment alone: FILE, which is FILE:1, or FILE:FACTOR"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

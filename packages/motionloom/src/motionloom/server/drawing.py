@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import Goal, start_of
-from motionloom.goals.remarks import Remark, numbers_read, parts_read, remarks_on, remarks_on_two
+from motionloom.goals.remarks import Remark, numbers_read, parts_read
 from motionloom.io import load
 from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.server.job_request import JobRequest
 from motionloom.tasks import run as tasks
 from motionloom.tasks import text
+from motionloom.tasks.adapting import remarks_on_words
 from motionloom.tasks.direct_edits import is_only_head_free
 from motionloom.tasks.run import Models, Plan, Result, run, run_each
 from motionloom.tasks.sampling import Progress
@@ -87,11 +88,11 @@ def remarks_of(models: Models, request: JobRequest) -> list[Remark]:
     if request.task == "edit" and is_only_head_free(request.values.keep):
         return []
     if request.task == "duet":
-        return remarks_on_two(texts, models.block.known, prior.known, prior.text)
+        return remarks_on_words(prior, texts, block=models.block)
     read = [] if timeline is None or request.task != "generate" else [numbers_read(timeline), parts_read(timeline)]
     remarks = [Remark(request.prompt, line) for line in read if line]
     heads = request.task == "generate" and not request.values.literal
-    return remarks + remarks_on(texts, prior.known, prior.text, heads=heads)
+    return remarks + remarks_on_words(prior, texts, heads=heads)
 
 
 def batch_key(request: JobRequest) -> tuple[Any, ...] | None:

@@ -74,7 +74,8 @@ def liveliness_ranks(bodies: np.ndarray, prompt: str = "") -> list[Rank]:
 def _mean_estimate(prior: Prior, prompt: str, length: int, seeds: Sequence[int], level: int) -> np.ndarray:
     """(length, features) standardised: the network's answer to pure noise, averaged over the noise of the seeds."""
     noise = row_noise(seeds)(np.empty((len(seeds), length, len(prior.mean)), np.float32))
-    return prior.net(noise, level, prior.net.bind(prior.condition([prompt] * len(seeds)))).mean(0)
+    net = prior.for_words(prompt).net
+    return net(noise, level, net.bind(prior.condition([prompt] * len(seeds)))).mean(0)
 
 
 def _distance(state: np.ndarray, mean: np.ndarray) -> float:

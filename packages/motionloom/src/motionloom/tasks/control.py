@@ -6,7 +6,7 @@ The goal is seen from the person's ground pose at frame 0; there it steers every
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Literal, Unpack
 
 import numpy as np
@@ -137,25 +137,30 @@ def steered_features(
     """
     check_prompts(prompts)
     pairs = [one if isinstance(one, tuple) else (one, 1 / len(adapters)) for one in adapters]
-    nets, weights = [adapted(prior.net, adapter) for adapter, _ in pairs], [weight for _, weight in pairs]
+    weights, adapted_nets = [weight for _, weight in pairs], lru_cache(1)(partial(_adapted_nets, pairs))
     chosen, change = Sampling.of(sampling, settings), toward(goal, prior)
     mask = goal_feature_mask(goal)
 
     def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
-        if not nets:
+        if not pairs:
             return corrected(denoise, [change] * len(batch.rows))
+        own = prior.for_words(prompts[batch.rows[0]])
         net = partial(
             blended,
-            nets,
+            adapted_nets(own.net),
             batch.cond,
             weights=weights,
-            guidance=strength(prior, chosen, [prompts[row] for row in batch.rows]),
+            guidance=strength(own, chosen, [prompts[row] for row in batch.rows]),
         )
         return _conditioned(net, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
     states = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=single_person_view(prior)))
     return [prior.to_features(states[row]) for row in range(len(prompts))]
+
+
+def _adapted_nets(adapters: Sequence[Weighted], net: PriorSession) -> list[PriorSession]:
+    return [adapted(net, adapter) for adapter, _ in adapters]
 
 
 def blended(

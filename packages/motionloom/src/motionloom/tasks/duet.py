@@ -88,6 +88,7 @@ def react(
     """
     prompts, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     check_pair(prior, count=chosen.number(), seconds=motion.seconds)
+    prior = prior.for_words(*prompts)
     partner, net, count = Partner.of(motion), block.net(prior), chosen.number()
     known = partner.state(net, count)
     sampled = pair_features(
@@ -204,7 +205,9 @@ def duet_features(
     """
     chosen = PairSampling.of(sampling, settings)
     denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance, chosen.bodies, begin)
-    both = (chain_rows(prior, one, chosen, None) for one in segments)
+    both = (
+        chain_rows(prior, one, chosen, None, beside=other) for one, other in zip(segments, segments[::-1], strict=True)
+    )
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
     states = sample_chain(
         prior,

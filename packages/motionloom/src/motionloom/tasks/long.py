@@ -214,8 +214,18 @@ def long_features(
         yield features(row, state)
 
 
-def chain_rows(prior: Prior, segments: Iterable[Segment], sampling: Sampling, past: "Past | None") -> Iterator[Row]:
-    """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
+def chain_rows(
+    prior: Prior,
+    segments: Iterable[Segment],
+    sampling: Sampling,
+    past: "Past | None",
+    *,
+    beside: Sequence[Segment] = (),
+) -> Iterator[Row]:
+    """The rows of the chain; one segment is read ahead, since the last has no transition behind it.
+
+    beside: what somebody else does meanwhile, who has the same network.
+    """
     before, number = len(past.known) if past else 0, 0
     lead, trail, behind = (past.lead, past.trail, past.behind) if past else (0, 0, None)
     adapted = adapted_priors(prior)
@@ -233,7 +243,7 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], sampling: Sampling, pa
             )
         after = overlap // 2 if following or behind is None else len(behind)
         length = before + frames + after
-        own = adapted(segment.adapters)
+        own = adapted(segment.adapters).for_words(segment.text, *(one.text for one in beside[number : number + 1]))
         bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
         edits = [holding_correction(past.known, prior, length)] if past and not number and len(past.known) else []
         if behind is not None and not following:

@@ -210,6 +210,7 @@ def generate_pair(
     prompts, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     if not all(words.strip() for words in prompts):
         raise MotionloomError("a prompt is empty; say in words what the two people do")
+    prior = prior.for_words(*prompts)
     goal = goals[0] or goals[1]
     check_pair(prior, count=chosen.number(), seconds=len(goal) / FPS if goal else seconds)
     frames = _goal_frames(goals) if goal else frames_in(seconds, prior.fps)
@@ -280,6 +281,7 @@ def complete_pair(
         MotionloomError: for an impossible request, also as `data.pairs.together` does.
     """
     prompts, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
+    prior = prior.for_words(*prompts)
     check_pair(prior, count=chosen.number(), seconds=seconds)
     if not 0 < seconds <= LONGEST:
         raise MotionloomError(f"two people cannot go on for {seconds:g} s; ask for more than 0 and at most {LONGEST:g}")

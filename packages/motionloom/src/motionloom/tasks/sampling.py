@@ -131,15 +131,14 @@ def sample(
     Where the sampling asks for the best of several, each motion's seed is chosen first (`with_best_seeds`).
     Raises MotionloomError for more steps than the weights have levels.
     """
-    net = prior.net if network is None else network
     way = sampling.levels(prior.schedule, observed.strength if observed else 1.0)
     if sampling.best_of > 1 and not halfway:
-        people, total = view.people if view else 1, len(rows.batches(sampling.batch())) * (len(way) - 1)
+        people, total = view.people if view else 1, len(_batches(prior, rows, sampling)) * (len(way) - 1)
         choosing, progress = _split_progress(progress, of=total)
         rows = with_best_seeds(
-            prior, rows, sampling, network=net, edits=edits, observed=observed, people=people, progress=choosing
+            prior, rows, sampling, network=network, edits=edits, observed=observed, people=people, progress=choosing
         )
-    batches, calls = rows.batches(sampling.batch()), 0
+    batches, calls = _batches(prior, rows, sampling), 0
     if halfway:
         way = way[: len(way) // 2 + 1]
     for numbers in batches:
@@ -149,7 +148,9 @@ def sample(
         batch = Batch(numbers, prior.condition(list(some.prompts), padded), list(some.seeds))
         cond = batch.cond
         noise = row_noise(batch.seeds, padded) if padded else rows.noise(batch.seeds)
-        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), strength(prior, sampling, some.prompts))
+        own = prior.for_words(some.prompts[0])
+        net = own.net if network is None else network
+        base = guided or guide(net, net.bind(cond), net.bind(cond.null()), strength(own, sampling, some.prompts))
         denoise, constrain = _identity_when_clean(base), None
         if observed is None:
             state = noise(np.empty((len(numbers), max(lengths), len(prior.mean)), np.float32))
@@ -176,6 +177,17 @@ def sample(
             frames = prior.smoothed(state[:, rows.slots :])
             state = denoise(np.concatenate([state[:, : rows.slots], frames], axis=1), 0)
         yield from ((number, one[:length]) for number, one, length in zip(numbers, state, lengths, strict=True))
+
+
+def _batches(prior: Prior, rows: Rows, sampling: Sampling) -> list[list[int]]:
+    """Numbers of rows that are denoised together: of as many tokens, and of words that the same adapters change."""
+    batches = []
+    for batch in rows.batches(sampling.batch()):
+        by_adapters: dict[tuple[int, ...], list[int]] = {}
+        for row in batch:
+            by_adapters.setdefault(tuple(map(id, prior.left_out(rows.prompts[row]))), []).append(row)
+        batches += by_adapters.values()
+    return batches
 
 
 def strength(prior: Prior, sampling: Sampling, prompts: Sequence[str]) -> Weight:

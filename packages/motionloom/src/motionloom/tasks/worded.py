@@ -24,13 +24,14 @@ from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
 from motionloom.goals.expected import missing
 from motionloom.goals.heads import head_said
-from motionloom.goals.remarks import numbers_read, parts_read, remarks_on
+from motionloom.goals.remarks import numbers_read, parts_read
 from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED, SOLVER, Sampling, Settings
+from motionloom.tasks.adapting import lines_by_text, remarks_on_words
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
@@ -94,7 +95,7 @@ class Worded:
         counted = {i for one in self.timeline.readings for i in range(one.first, one.end)}
         free = [i for i in range(len(begins) - 1) if i not in counted]
         texts = [segment.text for segment in self.timeline.plainer.segments]
-        if len(texts) == 1 and free:
+        if len(set(texts)) == 1 and len(free) == len(texts):
             return missing(texts[0], places, self.motion.fps)
         return [name for i in free for name in missing(texts[i], places[begins[i] : begins[i + 1]], self.motion.fps)]
 
@@ -215,7 +216,7 @@ def generate_worded(
         progress=progress,
     )
     texts = [segment.text for one in timelines for segment in one.segments]
-    unknown = {one.text: one.line for one in remarks_on(texts, prior.known, prior.text, heads=not (literal or as_one))}
+    unknown = lines_by_text(remarks_on_words(prior, texts, heads=not (literal or as_one)))
     return [
         replace(one, unknown={part.text: unknown[part.text] for part in one.timeline.segments if part.text in unknown})
         for one in motions

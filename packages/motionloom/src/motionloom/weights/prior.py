@@ -6,9 +6,9 @@ sizes, schedule, features, text encoder, licence, provenance, known sentences. N
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +76,11 @@ def parse_schedule(about: dict[str, Any]) -> Schedule:
 
 UNLIKE, ALIKE = 0.8, 0.95
 """Cosines to a taught caption up to which a prompt is guided as ever, and from which it is that caption."""
+OWN_WORDS = 0.22
+"""How much nearer a sentence may be to one that the prior knows than to a taught caption, and an adapter without a
+factor still changes it (decision 0039)."""
+MERGED = 4
+"""Merged networks that are kept for sentences which only some adapters change; each is as large as the prior's."""
 HALF_TAUGHT, LEAST_GUIDED = 0.7, 0.1
 """A factor of an adapter with which its captions need all guidance, and the share of it with which they do at 1."""
 
@@ -98,6 +103,10 @@ class Prior:
     """The fingerprint of the network that adapters were merged into; empty where none were."""
     taught: tuple[tuple[str, float], ...] = ()
     """The captions that these were taught, each with the factor of its adapter."""
+    base: "Prior | None" = None
+    """The same without the adapters that change only sentences like their captions; None: it has no such adapters."""
+    optional: tuple[Adapter, ...] = ()
+    """Those adapters."""
 
     @staticmethod
     def load(weights: str | Path = "default", *, device: str = "cpu") -> "Prior":
@@ -137,16 +146,72 @@ class Prior:
         after = np.concatenate([features[..., 1:, :], features[..., -1:, :]], axis=-2)
         return (before + 4 * features + after) / 6
 
-    def with_adapters(self, adapters: Sequence[tuple[Adapter, float]]) -> "Prior":
+    def with_adapters(self, adapters: Sequence[tuple[Adapter, float | None]]) -> "Prior":
         """The same prior with adapters of `motionloom teach` merged into its weights, each times its factor.
 
         Several add up, in whatever order they are merged. Adapters for control still belong to the result, as does a
-        two-person block. Raises `MotionloomError` for adapters of another kind or prior and for factors out of range.
+        two-person block. A factor of None is 1, and the adapter changes those sentences alone that are like its
+        captions (`for_words`). Raises `MotionloomError` for adapters of another kind or prior and for factors out of
+        range.
         """
         if not adapters:
             return self
         for adapter, _ in adapters:
             adapter.check_prior(self)
+        optional = tuple(adapter for adapter, factor in adapters if factor is None)
+        whole = self._merged([(adapter, 1.0 if factor is None else factor) for adapter, factor in adapters])
+        if not optional and self.base is None:
+            return whole
+        fixed = [(adapter, factor) for adapter, factor in adapters if factor is not None]
+        return replace(whole, base=(self.base or self)._merged(fixed), optional=(*self.optional, *optional))
+
+    def for_words(self, *prompts: str) -> "Prior":
+        """The prior that samples these words: without the optional adapters that were taught nothing like any of them.
+
+        A prompt is like a caption where no known sentence is nearer to it by more than `OWN_WORDS` (cosines of the text
+        encoder, subjects left out). An empty prompt is like none.
+        """
+        if self.base is None:
+            return self
+        left_out = self.left_out(*prompts)
+        return self._with_optional(tuple(adapter not in left_out for adapter in self.optional))
+
+    def left_out(self, *prompts: str) -> list[Adapter]:
+        """The optional adapters that do not change these words, as `for_words` says."""
+        texts = [text for text in map(bare, prompts) if text.strip()]
+        if self.base is None or not texts:
+            return list(self.optional)
+        vectors, known = unit(self.text.encode(texts).pooled), self.base.known
+        familiar = (vectors @ known.vectors.T).max(axis=1) if known is not None else np.full(len(texts), -np.inf)
+        return [
+            adapter
+            for adapter, captions in zip(self.optional, self._caption_vectors, strict=True)
+            if len(captions) and ((vectors @ captions.T).max(axis=1) < familiar - OWN_WORDS).all()
+        ]
+
+    @cached_property
+    def _caption_vectors(self) -> list[Array]:
+        return [
+            unit(self.text.encode([bare(text) for text in one.captions]).pooled) if one.captions else np.zeros((0, 1))
+            for one in self.optional
+        ]
+
+    @cached_property
+    def _with_optional(self) -> Callable[[tuple[bool, ...]], "Prior"]:
+        """The prior with some of its optional adapters."""
+        base = self.base
+        assert base is not None
+
+        @lru_cache(MERGED)
+        def some(apply: tuple[bool, ...]) -> Prior:
+            chosen = [(adapter, 1.0) for adapter, own in zip(self.optional, apply, strict=True) if own]
+            return self if all(apply) else base._merged(chosen)
+
+        return some
+
+    def _merged(self, adapters: Sequence[tuple[Adapter, float]]) -> "Prior":
+        if not adapters:
+            return self
         taught = tuple((text, factor) for adapter, factor in adapters if factor > 0 for text in adapter.captions)
         texts = [text for text, _ in taught]
         known = add_sentences(self.known, texts, self.text) if self.known is not None and texts else self.known
