@@ -15,7 +15,7 @@ class Teach(Checked):
     licence: str = declare(
         "text", "what one may do with the adapter, as the owner of the clips and that of the prior allow", "", high=1000
     )
-    steps: int = declare("whole", "training steps; more clips may need more", 1300, low=1, high=100_000)
+    steps: int = declare("whole", "training steps; more clips may need more", 2000, low=1, high=100_000)
     rank: int = declare("whole", "size of the change: 16 makes a file of 1.5 MB", 16, low=1, high=128)
     keep: float = declare("number", "share of the training on what the weights know already", 0.5, low=0, high=0.9)
     mirror: bool = declare("flag", "learn from the clips' mirror images", True)
