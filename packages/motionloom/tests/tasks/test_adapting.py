@@ -181,6 +181,10 @@ def test_an_adapter_without_a_factor_leaves_words_alone_that_are_known_better(kn
     assert [one.name for one in both.left_out(WALKS)] == [JUMPS, TURNS]
     assert both.left_out(JUMPS, TURNS) == []
     assert both.for_words(JUMPS, TURNS) is both
+    moved = both.to("cpu")
+    assert moved.base is not None
+    assert moved.base is not both.base
+    assert moved.for_words(WALKS).net is moved.base.net
 
 
 def test_it_does_so_in_timelines_and_beside_adapters_with_a_factor(knowing: Prior) -> None:

@@ -119,7 +119,7 @@ class Prior:
 
     def to(self, device: str) -> "Prior":
         """The same prior with its network on another device."""
-        return replace(self, net=self.net.on(device))
+        return replace(self, net=self.net.on(device), base=self.base and self.base.to(device))
 
     @cached_property
     def spread(self) -> Array:
