@@ -119,7 +119,8 @@ class Prior:
 
     def to(self, device: str) -> "Prior":
         """The same prior with its network on another device."""
-        return replace(self, net=self.net.on(device), base=self.base and self.base.to(device))
+        base = self.base and self.base.to(device)
+        return replace(self, net=self.net.on(device), base=base)
 
     @cached_property
     def spread(self) -> Array:
@@ -173,8 +174,8 @@ class Prior:
         """
         if self.base is None:
             return self
-        left_out = self.left_out(*prompts)
-        return self._with_optional(tuple(adapter not in left_out for adapter in self.optional))
+        absent = self.left_out(*prompts)
+        return self._with_optional(tuple(one not in absent for one in self.optional))
 
     def left_out(self, *prompts: str) -> list[Adapter]:
         """The optional adapters that do not change these words, as `for_words` says."""
