@@ -87,7 +87,7 @@ class Sampling(Checked):
         high=16,
     )
 
-    late_guidance = LATE_GUIDANCE
+    late_guidance, first_guidance = LATE_GUIDANCE, 1.0
 
     @classmethod
     def of(cls, sampling: Self | None, settings: Mapping[str, Any]) -> Self:
@@ -119,11 +119,12 @@ class Sampling(Checked):
         return sorted({round(level * strength) for level in all_of_them} | {0, least}, reverse=True)
 
     def strength(self, schedule: "Schedule", guidance: float | None = None) -> "Callable[[int], float]":
-        """The guidance, or another one, by noise level: with early spacing it rises towards the end (`rising`)."""
+        """The guidance, or another one, by noise level: with early spacing it rises (`rising`)."""
         from motionloom.diffusion import rising
 
         scale = self.guidance if guidance is None else guidance
-        return rising(scale, schedule.steps, self.late_guidance if self.spacing == "early" else 1)
+        factors = (self.late_guidance, self.first_guidance) if self.spacing == "early" else (1, 1)
+        return rising(scale, schedule.steps, *factors)
 
     def seeds(self, count: int) -> list[int]:
         """The seeds of ``count`` motions of one person."""
@@ -173,9 +174,12 @@ class PredictionSampling(Sampling):
 
 @dataclass(frozen=True)
 class PairSampling(Sampling):
-    """How two people are sampled: with the same guidance on all levels, else they come into each other more often."""
+    """How two people are sampled: with no more guidance in the end, else they come into each other more often.
 
-    late_guidance = 1.0
+    On the first levels, where it is decided who stands where, a third of what it adds (docs/decisions/0016).
+    """
+
+    late_guidance, first_guidance = 1.0, 1 / 3
 
     pair_guidance: float = declare(
         "number",
