@@ -48,6 +48,8 @@ export interface ComposeRequest {
   readonly seed?: number;
   /** strength of the text where a segment has none of its own: 2.5 */
   readonly guidance?: number;
+  /** the first motion, though it does not show what the words say plainly */
+  readonly literal?: boolean;
   /** motions to make */
   readonly count?: number;
   /** network calls per motion: fewer is faster */

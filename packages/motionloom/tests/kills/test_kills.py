@@ -31,7 +31,17 @@ Whole = tuple[list[str], Ended, Path]
 @pytest.fixture(scope="module")
 def whole(weights: str, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     """The words of the command, how it ends uninterrupted, and the folder that it wrote to."""
-    words = ["compose", *["walk", "jump", "sit"] * 6, "--seconds", "1", "--steps", "3", "--weights", weights]
+    words = [
+        "compose",
+        *["walk", "jump", "sit"] * 6,
+        "--seconds",
+        "1",
+        "--steps",
+        "3",
+        "--literal",
+        "--weights",
+        weights,
+    ]
     words += ["--out", "a.bvh", "--out", "b.npz"]
     folder = tmp_path_factory.mktemp("compose") / "whole"
     return words, uninterrupted(words, folder), folder

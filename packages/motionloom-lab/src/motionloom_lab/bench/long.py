@@ -126,7 +126,7 @@ def long_motion(
         peaks = []
         for some in texts:
             make = ["--seconds", f"{course.each:g}", "--steps", str(how.steps), "--guidance", str(how.guidance)]
-            peaks.append(run(["compose", *some, *make, "--weights", weights, "--out", str(out)]).peak_mb)
+            peaks.append(run(["compose", *some, "--literal", *make, "--weights", weights, "--out", str(out)]).peak_mb)
             progress(f"{len(some)} prompts: {peaks[-1]:.0f} MB")
     settings = {
         "prompts": len(texts[-1]),

@@ -270,6 +270,7 @@ class Maker:
             "person": row.whom,
             "timeline": timeline,
             "goals": order.goal,
+            "literal": task == "compose" or None,
         }
         sampling: Any = self._sampling(order, timeline and timeline.guidance)
         if task == "duet":

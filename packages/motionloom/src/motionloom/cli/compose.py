@@ -31,6 +31,7 @@ from motionloom.kinematics.deeds import LONGEST, happened
 from motionloom.motion import Motion
 from motionloom.requests.reading import resolve_sampling
 from motionloom.requests.tasks import Compose
+from motionloom.tasks import reattempts
 from motionloom.tasks.long import load_segment_adapters
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.splice import concatenate
@@ -59,10 +60,13 @@ def run_compose(arguments: Namespace) -> int:
     timeline = replace(timeline, segments=load_segment_adapters(prior, timeline.segments))
     streams = _open(arguments, outs, timeline, target)
     record: list[Motion] = []
-    interrupted = _make(arguments, prior, timeline, streams, record)
+    missed: list[str] = []
+    interrupted = _make(arguments, prior, timeline, streams, record, missed)
+    for line in missed:
+        say(line)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
     did = happened([concatenate(*record)] if record else [])
-    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks, happened=did)
+    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=[*remarks, *missed], happened=did)
     if interrupted:
         say(f"interrupted; {_finished_files(streams)} of {timeline.seconds:.2f} s")
         return 130
@@ -100,15 +104,18 @@ def _make(
     timeline: Timeline,
     streams: Sequence[Stream],
     record: list[Motion],
+    missed: list[str],
 ) -> bool:
     """Write the motion; true if it was interrupted after something was finished.
 
-    ``record`` gets its pieces where what happened is reported: of a motion that is not too long for that.
+    ``record`` gets its pieces where what happened is reported: of a motion that is not too long for that; ``missed``
+    sentences about what it does not show.
     """
     described = arguments.json and timeline.seconds <= LONGEST
 
     try:
-        with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is printed
+        pieces = _pieces(arguments, prior, timeline, missed)
+        with closing(pieces):  # the bar is gone before anything is printed
             pieces = _recorded(record, pieces) if described else pieces
             write_pieces(pieces if arguments.fps is None else resampled(pieces, arguments.fps), streams)
     except KeyboardInterrupt:
@@ -130,17 +137,19 @@ def _recorded(record: list[Motion], pieces: Iterable[Motion]) -> Generator[Motio
         record.append(piece)
 
 
-def _pieces(arguments: Namespace, prior: Prior, timeline: Timeline) -> Generator[Motion, None, None]:
+def _pieces(arguments: Namespace, prior: Prior, timeline: Timeline, missed: list[str]) -> Generator[Motion, None, None]:
     values = request_of(arguments, Compose, {"timeline": timeline})
+    whole = arguments.loop or not (values.literal or timeline.seconds > reattempts.LONGEST)
     plan = Plan(
         task="compose",
         values=values,
         sampling=resolve_sampling(values, timeline),
         timeline=timeline,
         start=None if timeline.start is None else load_motion(arguments, timeline.start),
-        in_pieces=not arguments.loop,
+        in_pieces=not whole,
     )
     for result in results("composing", plan, Models(prior)):
+        missed += result.remarks
         yield from result.people
 
 

@@ -41,6 +41,7 @@ class Compose(Finish, Adapted):
     guidance: float | None = like(
         Sampling, "guidance", "strength of the text where a segment has none of its own: 2.5", default=None
     )
+    literal: bool = like(Generate, "literal", "the first motion, though it does not show what the words say plainly")
     sampling: Sampling = group(Sampling(count=1), "count", "steps", "best_of")
 
 

@@ -118,7 +118,13 @@ def changed_runs(old: Sequence[Block], timed: Timed) -> list[Run] | None:
 
 
 def resample_runs(
-    timed: Timed, old: Motion, was: Sequence[Block], runs: Sequence[Run], progress: Moves | None = None
+    timed: Timed,
+    old: Motion,
+    was: Sequence[Block],
+    runs: Sequence[Run],
+    progress: Moves | None = None,
+    *,
+    seed: int | None = None,
 ) -> Motion:
     """The old motion with each run sampled, one after the other.
 
@@ -128,15 +134,16 @@ def resample_runs(
         was: what it was sampled from.
         runs: of `changed_runs`; at least one block is in none of them.
         progress: as of `long.compose`.
+        seed: of the first block of a run; None: its own.
     """
     begins, old_begins = _first_frames(timed.blocks), _first_frames(was)
     for run in runs:
         lead, trail = _margins(run, was, timed.blocks)
         moved = begins[run.first] - old_begins[run.old_first]
         first = begins[run.first] - lead
-        old = _sample_run(
-            timed, old, run, _Stretch(first, old_begins[run.old_end] + moved + trail, lead, trail), progress
-        )
+        at = _Stretch(first, old_begins[run.old_end] + moved + trail, lead, trail)
+        own = timed.sampling.seeds(1)[0] + run.first if seed is None else seed
+        old = _sample_run(timed, old, run, at, own, progress)
     return old
 
 
@@ -228,8 +235,8 @@ def _neighbouring_frames(old: Motion, at: _Stretch) -> Past:
 # One run
 
 
-def _sample_run(timed: Timed, old: Motion, run: Run, at: _Stretch, progress: Moves | None) -> Motion:
-    """The old motion with one run sampled."""
+def _sample_run(timed: Timed, old: Motion, run: Run, at: _Stretch, seed: int, progress: Moves | None) -> Motion:
+    """The old motion with one run sampled, its first block from that seed."""
     past, prior, track = _neighbouring_frames(old, at), timed.prior, timed.track
     if track and not at.first:
         past = replace(past, end=track.place(0))
@@ -238,7 +245,7 @@ def _sample_run(timed: Timed, old: Motion, run: Run, at: _Stretch, progress: Mov
     if not run_segments:  # a seam: no block, but the words of what follows
         near = timed.segments[min(run.first, len(timed.segments) - 1)]
         run_segments = [replace(near, seconds=0.0, goal=None)]
-    sampling = replace(timed.sampling, seed=timed.sampling.seeds(1)[0] + run.first, count=1, first=0)
+    sampling = replace(timed.sampling, seed=seed, count=1, first=0)
     seconds = at.first / prior.fps
     rows = long_features(prior, run_segments, past=past, begin=seconds, sampling=sampling, progress=progress)
     whole = np.concatenate([*rows, *([] if past.behind is None else [past.behind[:1]])])

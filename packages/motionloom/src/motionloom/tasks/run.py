@@ -20,7 +20,7 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
-from motionloom.tasks import control, duet, edit, long, pair, predict, redraw, text, worded
+from motionloom.tasks import control, duet, edit, long, pair, predict, reattempts, redraw, text, worded
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
@@ -205,6 +205,7 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     assert plan.timeline is not None
     segments, lock = long.load_segment_adapters(models.prior, plan.timeline.segments), plan.values.foot_lock
     takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]
+    progress = _Reported(progress)
     if (
         plan.previous is not None
         and plan.count == 1
@@ -212,8 +213,9 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     ):
         moved = chain_progress(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))
         motion = redraw.resample_runs(takes[0], *plan.previous, runs, moved)
-        measures = {"redrawn": [block for run in runs for block in range(run.first, run.end)]}
-        return iter([Result((motion,), measures=measures, blocks=takes[0].blocks)])
+        changed = [block for run in runs for block in range(run.first, run.end)]
+        result = _reattempted(plan, takes[0], motion, changed, progress)
+        return iter([replace(result, measures={"redrawn": changed})])
     motions = (long.compose if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
@@ -225,7 +227,32 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     )
     if plan.in_pieces:
         return (Result((piece,)) for piece in motions)
-    return (Result((motion,), blocks=timed.blocks) for timed, motion in zip(takes, motions, strict=True))
+    each = range(len(segments))
+    return (_reattempted(plan, timed, motion, each, progress) for timed, motion in zip(takes, motions, strict=True))
+
+
+@dataclass(eq=False)
+class _Reported:
+    """Progress that can be repeated, by what is sampled again: whoever listens may cancel."""
+
+    progress: Progress
+    last: tuple[int, int] = 0, 1
+
+    def __call__(self, calls: int, of: int) -> None:
+        self.last = calls, of
+        self.progress(calls, of)
+
+    def repeat(self, moves: int) -> None:
+        """Report again how far it was."""
+        self.progress(*self.last)
+
+
+def _reattempted(plan: Plan, timed: redraw.Timed, motion: Motion, blocks: Iterable[int], progress: _Reported) -> Result:
+    """The motion of a timeline, whose sampled blocks are held against their words unless the request is literal."""
+    if getattr(plan.values, "literal", True):
+        return Result((motion,), blocks=timed.blocks)
+    found = reattempts.reattempt(timed, motion, blocks, start=plan.start, progress=progress.repeat)
+    return Result((found.motion,), remarks=found.remarks(timed.segments), blocks=timed.blocks)
 
 
 def _run_one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:

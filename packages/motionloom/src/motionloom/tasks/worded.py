@@ -9,7 +9,7 @@ with the least missing. A head that nods, is shaken or looks aside is turned in 
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby, pairwise
@@ -112,9 +112,7 @@ class Worded:
         if self.said is None:
             return ""
         both = zip(self.said.segments, self.timeline.segments, strict=True)
-        changed = dict.fromkeys((one.text, other.text) for one, other in both if one.text != other.text)
-        both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
-        return both_ways and f"{both_ways}, which these weights know better"
+        return replacement_line([(one.text, other.text) for one, other in both])
 
     @property
     def shortfalls(self) -> list[str]:
@@ -149,6 +147,13 @@ class Worded:
         ):
             return ""
         return f"it ends standing still, from {begin:.1f} s on: what these weights do not know often does"
+
+
+def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
+    """A sentence with texts that are generated as others; empty where none is."""
+    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
+    both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
+    return both_ways and f"{both_ways}, which these weights know better"
 
 
 def read(
@@ -297,7 +302,7 @@ def _best_attempts(
             prior,
             [words[i].segments[0].text for i in unseen],
             [words[i].segments[0].seconds for i in unseen],
-            seeds=[_attempt_seed(seeds[i], number) for i in unseen],
+            seeds=[attempt_seed(seeds[i], number) for i in unseen],
             foot_lock=foot_lock,
             sampling=sampling,
             progress=later if number else first,
@@ -338,7 +343,7 @@ def _once_at_its_end(progress: Progress | None) -> tuple[Progress | None, Progre
     return first, lambda done, of: progress(calls, calls)
 
 
-def _attempt_seed(seed: int, number: int) -> int:
+def attempt_seed(seed: int, number: int) -> int:
     """The seed of an attempt: the motion's own, then others that depend on it alone."""
     return seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
 
@@ -352,7 +357,7 @@ def _best_try(
     for number in range(TRIES if counts else attempts):
         said = _scaled(timeline, shares)
         now = said.plainer if number else said
-        own = replace(sampling, seed=_attempt_seed(seed, number), first=0)
+        own = replace(sampling, seed=attempt_seed(seed, number), first=0)
         motion = _sample_timeline(prior, now, own, foot_lock)
         candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said if number else None)
         counted = [

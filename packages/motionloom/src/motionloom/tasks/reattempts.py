@@ -1,0 +1,112 @@
+"""Blocks of a timeline that do not show what their words say plainly are sampled again, between frames that stay.
+
+What `motionloom.tasks.worded` does with a sentence. A block is held against its words (`motionloom.goals.expected`).
+Where something is missing it is sampled from up to three other seeds, with a common verb for each rare one, as if it
+had been changed (`motionloom.tasks.redraw`), and the sample with the least missing stays.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate
+
+from motionloom.goals.expected import missing
+from motionloom.goals.segment import Segment
+from motionloom.goals.verbs import in_plainer_words
+from motionloom.motion import Motion
+from motionloom.tasks.long import compose
+from motionloom.tasks.redraw import Run, Timed, resample_runs
+from motionloom.tasks.sampling import Moves
+from motionloom.tasks.splice import concatenate
+from motionloom.tasks.watching import watching
+from motionloom.tasks.worded import ATTEMPTS, attempt_seed, replacement_line
+
+LONGEST = 120.0
+"""Seconds of sampled blocks up to which they are held against their words."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reattempted:
+    """A long motion whose blocks were held against their words."""
+
+    motion: Motion
+    again: dict[int, str]
+    """The blocks that are of a later attempt, and the words in which they were sampled."""
+    missing: dict[int, list[str]]
+    """What a block does not show in any attempt."""
+
+    def remarks(self, segments: Sequence[Segment]) -> list[str]:
+        """A sentence for the words that were replaced, and for each block that does not show what it should."""
+        pairs = [(segments[i].text, text) for i, text in self.again.items()]
+        lines = [
+            f"'{segments[i].text}': not found in {ATTEMPTS} attempts: {', '.join(names)}"
+            for i, names in self.missing.items()
+        ]
+        return [*filter(None, [replacement_line(pairs)]), *lines]
+
+
+def reattempt(
+    timed: Timed,
+    motion: Motion,
+    blocks: Iterable[int],
+    *,
+    start: Motion | None = None,
+    progress: Moves | None = None,
+) -> Reattempted:
+    """The motion of a timeline with those of its blocks sampled again that do not show what their words say plainly.
+
+    A block with a goal, on a path, or first behind a ``start`` that more blocks follow, stays as it is.
+
+    Args:
+        timed: the timeline; the segments' adapters are loaded.
+        motion: what was sampled from it: the 22-joint person at 20 frames per second.
+        blocks: numbers of those that were sampled; none is looked at where they are longer than `LONGEST` together.
+        start: what the motion goes on from.
+        progress: called with the number of row moves, which are further ones.
+    """
+    looked = [i for i in blocks if _is_free(timed, i, start)]
+    if sum(timed.segments[i].seconds for i in looked) > LONGEST:
+        looked = []
+    begins = [0, *accumulate(block.frames for block in timed.blocks)]
+    plain = [in_plainer_words(one.text) for one in timed.segments]
+
+    def unseen(of: Motion, near: Iterable[int]) -> dict[int, list[str]]:
+        places = of.positions()
+        cuts = {i: places[begins[i] : begins[i + 1]] for i in near if i in looked}
+        return {i: missing(plain[i], own, of.fps) for i, own in cuts.items()}
+
+    best, kept = unseen(motion, looked), {}
+    with watching(lambda denoised: None):  # what is watched is the first attempt
+        for i in looked:
+            near = (i - 1, i, i + 1)
+            for number in range(1, ATTEMPTS):
+                if not best[i]:
+                    break
+                again = _sample_again(timed, motion, i, plain[i], number, start, progress)
+                found = unseen(again, near)
+                if _total(found) < _total({k: best[k] for k in found}):
+                    motion, best, kept[i] = again, best | found, plain[i]
+    return Reattempted(motion, kept, {i: names for i, names in best.items() if names})
+
+
+def _is_free(timed: Timed, i: int, start: Motion | None) -> bool:
+    goal = timed.segments[i].goal
+    first_of_more = start is not None and i == 0 and len(timed.segments) > 1
+    return timed.path is None and (goal is None or goal.empty) and not first_of_more
+
+
+def _total(found: dict[int, list[str]]) -> int:
+    return sum(map(len, found.values()))
+
+
+def _sample_again(
+    timed: Timed, motion: Motion, i: int, text: str, number: int, start: Motion | None, progress: Moves | None
+) -> Motion:
+    """The motion with block i in these words, from the seed of that attempt."""
+    segments = [replace(one, text=text) if k == i else one for k, one in enumerate(timed.segments)]
+    seed = attempt_seed(timed.sampling.seeds(1)[0] + i, number)
+    if len(segments) == 1:
+        own = replace(timed.sampling, seed=seed, first=0, count=1)
+        pieces = compose(timed.prior, segments, start=start, foot_lock=timed.foot_lock, sampling=own, progress=progress)
+        return concatenate(*pieces)
+    again = replace(timed, segments=segments)
+    return resample_runs(again, motion, timed.blocks, [Run(i, i + 1, i, i + 1)], progress, seed=seed)
