@@ -82,7 +82,11 @@ function results(state: JobState): readonly Result[] {
     throw new Refused(state.error ?? "The job failed and did not say why.", state.status ?? 422);
   if (state.state === "cancelled") throw new DOMException("cancelled", "AbortError");
   const { remarks = [], notes = [] } = state;
-  return state.results.map((one) => ({ ...one, remarks: [...remarks, ...(one.remarks ?? [])], notes }));
+  return state.results.map((one) => ({
+    ...one,
+    remarks: [...remarks, ...(one.remarks ?? [])],
+    notes: [...notes, ...(one.notes ?? [])],
+  }));
 }
 
 function levelOf(json: LevelJson): Level {

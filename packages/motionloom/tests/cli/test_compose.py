@@ -12,7 +12,7 @@ from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
-from motionloom.tasks import long
+from motionloom.tasks import long, reattempts
 from tests.cli.said import complaint
 
 THREE = "seed: 4\nguidance: 3\nsegments:\n- walk\n- {text: jump, seconds: 2}\n- text: sit down\n  seconds: 1\n"
@@ -49,7 +49,8 @@ def call(monkeypatch: pytest.MonkeyPatch) -> dict:
 
 
 def compose(weights: str, *words: str) -> int:
-    return main(["compose", *words, "--weights", weights])
+    """The command that writes what is sampled, as it is sampled."""
+    return main(["compose", *words, "--literal", "--weights", weights])
 
 
 def file_names() -> set[str]:
@@ -209,3 +210,35 @@ def test_a_tiny_network_makes_a_motion_of_exactly_the_length_asked_for(weights):
     assert len(io.load("a.bvh")) == len(io.load("a.npz")) == 100 + 26 + 12
     assert compose(weights, "walk", "--seconds", "1", "--steps", "2", "--out", "one.npz") == 0
     assert len(io.load("one.npz")) == 20
+
+
+def test_what_is_missing_in_a_segment_is_told_and_a_literal_motion_is_the_first(
+    weights: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reattempts, "missing", lambda text, places, fps: ["a kick"] * (text == "kick"))
+    words = ["compose", "walk", "kick", "--seconds", "1", "--steps", "2", "--json", "--weights", weights]
+    assert main([*words, "--out", "looked.npz"]) == 0
+    output, line = capsys.readouterr(), "'kick': not found in 4 attempts: a kick"
+    assert f"motionloom: {line}\n" in output.err
+    assert line in json.loads(output.out)["remarks"]
+    assert main([*words, "--literal", "--out", "literal.npz"]) == 0
+    output = capsys.readouterr()
+    assert "attempts" not in output.err + output.out
+    looked, literal = (io.load(name) for name in ("looked.npz", "literal.npz"))
+    np.testing.assert_allclose(looked.root[:5, [0, 2]], literal.root[:5, [0, 2]], atol=0.05)
+    assert len(looked) == len(literal) == 40
+
+
+def test_a_long_timeline_is_written_as_it_is_sampled_and_an_interrupted_short_one_not_at_all(
+    weights: str, call: dict, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compose_takes(*_, **__) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(long, "compose_takes", compose_takes)
+    call["stop"] = 12
+    words = ["--seconds", "10", "--weights", weights, "--out", "a.bvh"]
+    assert main(["compose", *["walk"] * 12, *words]) == 130
+    assert file_names() == set()
+    assert main(["compose", *["walk"] * 13, *words]) == 130
+    assert io.load("a.bvh").seconds == 120

@@ -86,8 +86,9 @@ def test_a_pair_is_the_same_in_any_company(prior: Prior, block: PairBlock) -> No
 
 
 def test_people_who_do_not_listen_are_the_priors_own(prior: Prior) -> None:
-    pair, _ = features(prior, block_of(prior, fresh=True), PROMPTS, [3, 4])
-    alone = sample_features(prior, PROMPTS, [FRAMES] * 2, seeds=[3, 4], steps=4)
+    how = {"spacing": "index"}  # guided on all levels alike
+    pair, _ = features(prior, block_of(prior, fresh=True), PROMPTS, [3, 4], **how)
+    alone = sample_features(prior, PROMPTS, [FRAMES] * 2, seeds=[3, 4], steps=4, **how)
     np.testing.assert_allclose(pair[0], np.stack(alone), rtol=0, atol=1e-5)
 
 

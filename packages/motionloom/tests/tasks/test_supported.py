@@ -10,7 +10,7 @@ from motionloom.kinematics.physics import WRISTS, J
 from motionloom.kinematics.stairs import hovering, stairs
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.supported import add_support
+from motionloom.tasks.supported import add_support, add_support_between, climbs
 
 FPS = 20.0
 
@@ -66,3 +66,30 @@ def test_hands_come_out_of_the_floor() -> None:
     lying = replace(lying, root=root, rotations=rotations)
     assert lying.positions()[:, WRISTS[0], 1].max() < -0.05
     assert add_support(lying).positions()[:, WRISTS, 1].min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("A teenager walks upstairs.", True),
+        ("the fireman goes up a ladder", True),
+        ("she climbs onto the box", True),
+        ("walking down the steps to the basement", True),
+        ("he takes two steps back", False),
+        ("a person walks", False),
+    ],
+)
+def test_words_of_stairs_ladders_and_climbing(text: str, expected: bool) -> None:
+    assert climbs(["a person waves", text]) is expected
+
+
+def test_steps_come_only_where_they_may_and_other_frames_stay() -> None:
+    flight = climbing(0, 0.2, 0.33, 0.55, 0.66)
+    assert add_support(flight, stairs=False) is flight
+    rising = lifted(np.arange(60) / FPS)
+    part = add_support_between(rising, [(30, 50)])
+    whole = add_support(rising)
+    assert not np.array_equal(whole.root, rising.root)
+    for at, expected in ((slice(0, 30), rising), (slice(30, 50), whole), (slice(50, 60), rising)):
+        assert np.array_equal(part.root[at], expected.root[at])
+        assert np.array_equal(part.rotations[at], expected.rotations[at])

@@ -4,6 +4,7 @@ import logging
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from motionloom.errors import MotionloomError
@@ -210,6 +211,7 @@ class Worker:
                 "measures": measures,
                 "happened": did,
                 "remarks": result.remarks,
+                "notes": [asdict(one) for one in result.notes],
             }
         )
 

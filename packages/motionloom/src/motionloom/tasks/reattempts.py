@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from motionloom.goals.expected import missing
+from motionloom.goals.remarks import Remark
 from motionloom.goals.segment import Segment
 from motionloom.goals.verbs import in_plainer_words
 from motionloom.motion import Motion
@@ -32,16 +33,16 @@ class Reattempted:
     again: dict[int, str]
     """The blocks that are of a later attempt, and the words in which they were sampled."""
     missing: dict[int, list[str]]
-    """What a block does not show in any attempt."""
+    """What a block does not show in any attempt; also of blocks that were not sampled again."""
 
-    def remarks(self, segments: Sequence[Segment]) -> list[str]:
-        """A sentence for the words that were replaced, and for each block that does not show what it should."""
-        pairs = [(segments[i].text, text) for i, text in self.again.items()]
-        lines = [
-            f"'{segments[i].text}': not found in {ATTEMPTS} attempts: {', '.join(names)}"
-            for i, names in self.missing.items()
-        ]
-        return [*filter(None, [replacement_line(pairs)]), *lines]
+    def notes(self, segments: Sequence[Segment]) -> list[Remark]:
+        """A remark on each text that was replaced, and on each block that does not show what it should."""
+        replaced = {segments[i].text: text for i, text in self.again.items() if text != segments[i].text}
+        remarks = [Remark(one, replacement_line([(one, other)])) for one, other in replaced.items()]
+        for i, names in self.missing.items():
+            text = segments[i].text
+            remarks.append(Remark(text, f"'{text}': not found in {ATTEMPTS} attempts: {', '.join(names)}"))
+        return remarks
 
 
 def reattempt(
@@ -59,13 +60,14 @@ def reattempt(
     Args:
         timed: the timeline; the segments' adapters are loaded.
         motion: what was sampled from it: the 22-joint person at 20 frames per second.
-        blocks: numbers of those that were sampled; none is looked at where they are longer than `LONGEST` together.
+        blocks: numbers of those that may be sampled again; none is where they are longer than `LONGEST` together.
         start: what the motion goes on from.
         progress: called with the number of row moves, which are further ones.
     """
-    looked = [i for i in blocks if _is_free(timed, i, start)]
-    if sum(timed.segments[i].seconds for i in looked) > LONGEST:
-        looked = []
+    looked = [i for i in range(len(timed.segments)) if _is_free(timed, i, start)]
+    sampled = set(blocks)
+    if sum(timed.segments[i].seconds for i in sampled) > LONGEST:
+        return Reattempted(motion, {}, {})
     begins = [0, *accumulate(block.frames for block in timed.blocks)]
     plain = [in_plainer_words(one.text) for one in timed.segments]
 
@@ -76,7 +78,7 @@ def reattempt(
 
     best, kept = unseen(motion, looked), {}
     with watching(lambda denoised: None):  # what is watched is the first attempt
-        for i in looked:
+        for i in (i for i in looked if i in sampled):
             near = (i - 1, i, i + 1)
             for number in range(1, ATTEMPTS):
                 if not best[i]:

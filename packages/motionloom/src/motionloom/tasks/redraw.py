@@ -147,6 +147,15 @@ def resample_runs(
     return old
 
 
+def sampled_frames(timed: Timed, was: Sequence[Block], runs: Sequence[Run]) -> list[tuple[int, int]]:
+    """Half-open ranges of the frames of the new motion that `resample_runs` samples; arguments as there."""
+    begins = _first_frames(timed.blocks)
+    margins = [_margins(run, was, timed.blocks) for run in runs]
+    return [
+        (begins[run.first] - lead, begins[run.end] + trail) for run, (lead, trail) in zip(runs, margins, strict=True)
+    ]
+
+
 def blocks_from(values: Any, frames: int) -> list[Block]:
     """Blocks from the plain values in the file of a motion of so many frames; none where they do not fit it."""
     if not isinstance(values, list) or not all(isinstance(one, list) and len(one) == 3 for one in values):

@@ -15,7 +15,10 @@ import numpy as np
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import Goal
 from motionloom.goals.hold import FixedJoints
+from motionloom.goals.remarks import Remark
+from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import Timeline, single_segment
+from motionloom.kinematics.stairs import stairs
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
@@ -24,6 +27,7 @@ from motionloom.tasks import control, duet, edit, long, pair, predict, reattempt
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
+from motionloom.tasks.supported import add_support, add_support_between, climbs
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -122,6 +126,8 @@ class Result:
     measures: dict[str, Any] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     """What was missed, a sentence each."""
+    notes: list[Remark] = field(default_factory=list)
+    """Those of them that are about the words of a block."""
     about: Any = None
     """The task's own result: `Worded` or `Controlled`."""
     blocks: Sequence[redraw.Block] = ()
@@ -209,13 +215,15 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     if (
         plan.previous is not None
         and plan.count == 1
+        and not (_climbs(segments) or stairs(plan.previous[0].positions(), plan.previous[0].fps))
         and (runs := redraw.changed_runs(plan.previous[1], takes[0])) is not None
     ):
         moved = chain_progress(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))
         motion = redraw.resample_runs(takes[0], *plan.previous, runs, moved)
         changed = [block for run in runs for block in range(run.first, run.end)]
         result = _reattempted(plan, takes[0], motion, changed, progress)
-        return iter([replace(result, measures={"redrawn": changed})])
+        spans = redraw.sampled_frames(takes[0], plan.previous[1], runs)
+        return iter([replace(_supported(takes[0], result, spans), measures={"redrawn": changed})])
     motions = (long.compose if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
@@ -228,7 +236,30 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     if plan.in_pieces:
         return (Result((piece,)) for piece in motions)
     each = range(len(segments))
-    return (_reattempted(plan, timed, motion, each, progress) for timed, motion in zip(takes, motions, strict=True))
+    return (
+        _supported(timed, _reattempted(plan, timed, motion, each, progress))
+        for timed, motion in zip(takes, motions, strict=True)
+    )
+
+
+def _climbs(segments: Sequence[Segment]) -> bool:
+    return climbs(segment.text for segment in segments)
+
+
+def _supported(timed: redraw.Timed, result: Result, spans: Sequence[tuple[int, int]] | None = None) -> Result:
+    """The motion of a timeline on the floor, or on steps where its words climb; spans: in these frames, on the floor.
+
+    Left as it is where feet are not locked, and where goals say how high something is.
+    """
+    goals = [timed.path, *(segment.goal for segment in timed.segments)]
+    if not timed.foot_lock or any(goal is not None and goal.mask[..., 1].any() for goal in goals):
+        return result
+    [motion] = result.people
+    if spans is None:
+        motion = add_support(motion, stairs=_climbs(timed.segments))
+    else:
+        motion = add_support_between(motion, spans)
+    return replace(result, people=(motion,))
 
 
 @dataclass(eq=False)
@@ -252,7 +283,8 @@ def _reattempted(plan: Plan, timed: redraw.Timed, motion: Motion, blocks: Iterab
     if getattr(plan.values, "literal", True):
         return Result((motion,), blocks=timed.blocks)
     found = reattempts.reattempt(timed, motion, blocks, start=plan.start, progress=progress.repeat)
-    return Result((found.motion,), remarks=found.remarks(timed.segments), blocks=timed.blocks)
+    notes = found.notes(timed.segments)
+    return Result((found.motion,), remarks=[one.line for one in notes], notes=notes, blocks=timed.blocks)
 
 
 def _run_one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:

@@ -3,6 +3,8 @@
 Each of these leaves a motion that has nothing of the kind as it is.
 """
 
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,23 +13,34 @@ from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
-from motionloom.kinematics.stairs import hovering, stairs
+from motionloom.kinematics.stairs import hovering
+from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
 
+_CLIMB = re.compile(
+    r"\b(?:(?:up|down)?stairs?|stairway|staircase|ladder|climb\w*|(?:up|down) (?:the|some|a few|a flight of) steps)\b"
+)
 SUNK = 0.02
 """Metres by which a hand or the head may be under the floor."""
 REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
 """Metres over the floor where the joint of a hand, and of the head, comes to lie."""
 
 
-def add_support(motion: Motion) -> Motion:
+def climbs(texts: Iterable[str]) -> bool:
+    """Whether some words are of stairs, of a ladder, or of climbing."""
+    return any(_CLIMB.search(text.lower()) for text in texts)
+
+
+def add_support(motion: Motion, *, stairs: bool = True) -> Motion:
     """The motion with its feet on steps of one height where it climbs, on the floor where it hovers, its hands above.
 
-    motion: of the 22-joint person at 20 frames per second, on the floor y = 0.
+    motion: of the 22-joint person at 20 frames per second, on the floor y = 0. stairs: whether there may be steps.
     """
     places = motion.positions()
-    moved = _grounded if hovering(places, motion.fps) else _on_stairs
-    motion = moved(motion, places)
+    if hovering(places, motion.fps):
+        motion = _grounded(motion, places)
+    elif stairs:
+        motion = _on_stairs(motion, places)
     places, goal = motion.positions(), Goal.nothing(len(motion))
     for joint, rest in REST.items():
         sunk = places[:, joint, 1] < rest - SUNK
@@ -36,8 +49,21 @@ def add_support(motion: Motion) -> Motion:
     return fit(motion, goal) if goal.mask.any() else motion
 
 
+def add_support_between(motion: Motion, spans: Sequence[tuple[int, int]]) -> Motion:
+    """The same in half-open ranges of frames, without steps; the other frames stay bit for bit."""
+    supported = add_support(motion, stairs=False)
+    frames = np.zeros((len(motion), 1, 1), dtype=bool)
+    for first, end in spans:
+        frames[first:end] = True
+    return replace(
+        motion,
+        root=np.where(frames[:, 0], supported.root, motion.root),
+        rotations=np.where(frames, supported.rotations, motion.rotations),
+    )
+
+
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
-    flight = stairs(places, motion.fps)
+    flight = find_stairs(places, motion.fps)
     if flight is None:
         return motion
     goal = Goal.nothing(len(motion))
