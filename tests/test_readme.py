@@ -137,6 +137,24 @@ def test_links_lead_to_files(document: Path) -> None:
     assert not missing, f"{document.name} links to {missing}"
 
 
+def headings(document: Path) -> set[str]:
+    """The anchors of a document's headings, as GitHub makes them."""
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    plain = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", title).strip().lower() for title in titles]
+    return {re.sub(r"[^\w -]", "", title).replace(" ", "-") for title in plain}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_links_lead_to_headings(document: Path) -> None:
+    """What stands behind the # of a link is a heading of the document."""
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    links = re.findall(r"\]\(([^)\s#:]*)#([^)\s]+)\)", text)
+    places = [(document.parent / name if name else document, anchor) for name, anchor in links]
+    lost = [anchor for place, anchor in places if place.suffix == ".md" and anchor not in headings(place)]
+    assert not lost, f"{document.name} links to headings that are not there: {lost}"
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
 def test_named_files_exist(document: Path) -> None:
     """Every path of the project that a document names in backticks is there."""
