@@ -108,13 +108,6 @@ def test_goals_paths_and_what_goes_on_from_a_motion_are_left_alone(prior: Prior,
     assert list(reattempt(plain, old, range(3), start=old).missing) == [1, 2]
 
 
-def test_a_very_long_timeline_stays_as_it_is(prior: Prior, looks: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    looks["a person sits"] = [1]
-    monkeypatch.setattr(reattempts, "LONGEST", 5.9)
-    timeline = timed(prior, SEGMENTS)
-    assert not reattempt(timeline, sampled(timeline), range(3)).missing
-
-
 def test_who_listens_to_the_progress_can_cancel_an_attempt(prior: Prior, looks: Any) -> None:
     looks["a person sits"] = [1]
     timeline = timed(prior, SEGMENTS)
@@ -133,7 +126,9 @@ def motion_of(plan: Plan, prior: Prior) -> tuple[Motion, list[str], list[tuple[i
     return result.people[0], result.remarks, reports
 
 
-def test_a_request_is_held_against_its_words_unless_it_is_literal(prior: Prior, looks: Any) -> None:
+def test_a_request_is_held_against_its_words_unless_it_is_literal_or_long(
+    prior: Prior, looks: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     looks["a man walks"] = [1, 0]
     timeline, sampling = Timeline(SEGMENTS), Sampling(steps=STEPS, count=1)
     plan = Plan(task="compose", values=Compose(timeline=timeline), sampling=sampling, timeline=timeline)
@@ -147,6 +142,10 @@ def test_a_request_is_held_against_its_words_unless_it_is_literal(prior: Prior, 
     assert nothing == []
     assert np.array_equal(first.rotations, sampled(timed(prior, SEGMENTS)).rotations)
     assert not np.array_equal(first.rotations, motion.rotations)
+    monkeypatch.setattr(reattempts, "LONGEST", 5.9)
+    too_long, nothing, _ = motion_of(plan, prior)
+    assert nothing == []
+    assert np.array_equal(too_long.rotations, first.rotations)
 
 
 def test_only_changed_blocks_are_sampled_again_and_all_are_reported(

@@ -260,6 +260,7 @@ class Maker:
     def _plan(self, order: Order) -> Plan:
         options, row, timeline = self.options, order.row, order.timeline
         task = row.task or "generate"
+        task = "compose" if task == "generate" and timeline is not None and not timeline.readings else task
         goals = (None, order.goal) if row.whom else (order.goal, None)
         values = {
             "prompt": row.prompt,

@@ -22,7 +22,7 @@ from motionloom.tasks.watching import watching
 from motionloom.tasks.worded import ATTEMPTS, attempt_seed, replacement_line
 
 LONGEST = 120.0
-"""Seconds of sampled blocks up to which they are held against their words."""
+"""Seconds of sampled blocks up to which requests have them held against their words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +60,12 @@ def reattempt(
     Args:
         timed: the timeline; the segments' adapters are loaded.
         motion: what was sampled from it: the 22-joint person at 20 frames per second.
-        blocks: numbers of those that may be sampled again; none is where they are longer than `LONGEST` together.
+        blocks: numbers of those that may be sampled again.
         start: what the motion goes on from.
         progress: called with the number of row moves, which are further ones.
     """
     looked = [i for i in range(len(timed.segments)) if _is_free(timed, i, start)]
     sampled = set(blocks)
-    if sum(timed.segments[i].seconds for i in sampled) > LONGEST:
-        return Reattempted(motion, {}, {})
     begins = [0, *accumulate(block.frames for block in timed.blocks)]
     plain = [in_plainer_words(one.text) for one in timed.segments]
 

@@ -168,7 +168,7 @@ def run_each(
 
 def is_batched(plan: Any) -> bool:
     """Whether the motions of a plan are sampled in the same network calls, rather than one after the other."""
-    return plan.task != "duet" and plan.timeline is not None and not plan.timeline.readings
+    return plan.task in ("compose", "control") and plan.timeline is not None and not plan.timeline.readings
 
 
 def _report_group(progress: Progress, begin: int, some: int, count: int, calls: int, of: int) -> None:
@@ -221,9 +221,9 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
         moved = chain_progress(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))
         motion = redraw.resample_runs(takes[0], *plan.previous, runs, moved)
         changed = [block for run in runs for block in range(run.first, run.end)]
-        result = _reattempted(plan, takes[0], motion, changed, progress)
         spans = redraw.sampled_frames(takes[0], plan.previous[1], runs)
-        return iter([replace(_supported(takes[0], result, spans), measures={"redrawn": changed})])
+        result = _held_to_words(plan, takes[0], motion, progress, changed, spans)
+        return iter([replace(result, measures={"redrawn": changed})])
     motions = (long.compose if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
@@ -235,31 +235,11 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     )
     if plan.in_pieces:
         return (Result((piece,)) for piece in motions)
-    each = range(len(segments))
-    return (
-        _supported(timed, _reattempted(plan, timed, motion, each, progress))
-        for timed, motion in zip(takes, motions, strict=True)
-    )
+    return (_held_to_words(plan, timed, motion, progress) for timed, motion in zip(takes, motions, strict=True))
 
 
 def _climbs(segments: Sequence[Segment]) -> bool:
     return climbs(segment.text for segment in segments)
-
-
-def _supported(timed: redraw.Timed, result: Result, spans: Sequence[tuple[int, int]] | None = None) -> Result:
-    """The motion of a timeline on the floor, or on steps where its words climb; spans: in these frames, on the floor.
-
-    Left as it is where feet are not locked, and where goals say how high something is.
-    """
-    goals = [timed.path, *(segment.goal for segment in timed.segments)]
-    if not timed.foot_lock or any(goal is not None and goal.mask[..., 1].any() for goal in goals):
-        return result
-    [motion] = result.people
-    if spans is None:
-        motion = add_support(motion, stairs=_climbs(timed.segments))
-    else:
-        motion = add_support_between(motion, spans)
-    return replace(result, people=(motion,))
 
 
 @dataclass(eq=False)
@@ -278,13 +258,32 @@ class _Reported:
         self.progress(*self.last)
 
 
-def _reattempted(plan: Plan, timed: redraw.Timed, motion: Motion, blocks: Iterable[int], progress: _Reported) -> Result:
-    """The motion of a timeline, whose sampled blocks are held against their words unless the request is literal."""
-    if getattr(plan.values, "literal", True):
+def _held_to_words(
+    plan: Plan,
+    timed: redraw.Timed,
+    motion: Motion,
+    progress: _Reported,
+    changed: Sequence[int] | None = None,
+    spans: Sequence[tuple[int, int]] = (),
+) -> Result:
+    """The motion of a timeline, blocks that do not show their words sampled again, on the floor or on steps.
+
+    changed, spans: the blocks and frames that were sampled, where not all were. A literal request, and what is longer
+    than `reattempts.LONGEST`, stays as it was sampled; so does the height of people whose goals say heights.
+    """
+    blocks = range(len(timed.segments)) if changed is None else changed
+    seconds = sum(timed.segments[i].seconds for i in blocks)
+    if getattr(plan.values, "literal", True) or seconds > reattempts.LONGEST:
         return Result((motion,), blocks=timed.blocks)
     found = reattempts.reattempt(timed, motion, blocks, start=plan.start, progress=progress.repeat)
-    notes = found.notes(timed.segments)
-    return Result((found.motion,), remarks=[one.line for one in notes], notes=notes, blocks=timed.blocks)
+    motion, notes = found.motion, found.notes(timed.segments)
+    goals = [timed.path, *(segment.goal for segment in timed.segments)]
+    if timed.foot_lock and not any(goal is not None and goal.mask[..., 1].any() for goal in goals):
+        if changed is None:
+            motion = add_support(motion, stairs=_climbs(timed.segments))
+        else:
+            motion = add_support_between(motion, spans)
+    return Result((motion,), remarks=[one.line for one in notes], notes=notes, blocks=timed.blocks)
 
 
 def _run_one(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
