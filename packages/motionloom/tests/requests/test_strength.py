@@ -33,4 +33,5 @@ def test_published_spacing_and_no_guidance_stay_the_same_on_all_levels(sampling:
 def test_two_people_are_guided_less_where_it_is_decided_who_stands_where() -> None:
     strength = PairSampling(guidance=2.5).strength(SCHEDULE)
     assert strength(999) == strength(801) == pytest.approx(1.5)
-    assert strength(800) == strength(10) == 2.5
+    assert strength(800) == strength(10) == pytest.approx(3.0)
+    assert PairSampling().strength(SCHEDULE, 4.0)(999) == pytest.approx(2.0)

@@ -76,18 +76,17 @@ def guide(
     return guided
 
 
-def rising(scale: float, levels: int, factor: float, first: float = 1.0) -> Callable[[int], float]:
+def rising(scale: float, levels: int, factor: float) -> Callable[[int], float]:
     """A guidance scale by level: what it adds to 1 is ``factor`` times as much below a tenth of the ``levels``.
 
     Above three tenths it is ``scale``, in between it is interpolated; scales up to 1 stay as they are. What the motion
     is has been decided before; how lively its details are has not (growing scales: Wang et al. 2024, *Analysis of
-    Classifier-Free Guidance Weight Schedulers*). Above four fifths what it adds is ``first`` times as much.
+    Classifier-Free Guidance Weight Schedulers*).
     """
 
     def at(level: int) -> float:
-        share = level / levels
-        times = first if share > 0.8 else 1 + (factor - 1) * min(max(1.5 - 5 * share, 0.0), 1.0)
-        return scale + max(scale - 1, 0.0) * (times - 1)
+        late = min(max(1.5 - 5 * level / levels, 0.0), 1.0)
+        return scale + max(scale - 1, 0.0) * (factor - 1) * late
 
     return at
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
 LATE_GUIDANCE = 3.0
 """How motions are sampled unless the request differs (docs/decisions/0008); the last is the factor of `rising`."""
+_FIRST_AND_THEN = 1 / 3, 4 / 3
+"""Of two people: the factors of what guidance adds, where it is decided who stands where and behind that."""
 BATCH = 8
 """Rows in one network call."""
 SOLVERS = ("ddpm", "ddim", "dpm2m", "dpm2m-sde")
@@ -87,8 +89,6 @@ class Sampling(Checked):
         high=16,
     )
 
-    late_guidance, first_guidance = LATE_GUIDANCE, 1.0
-
     @classmethod
     def of(cls, sampling: Self | None, settings: Mapping[str, Any]) -> Self:
         """``sampling``, or the defaults, with single settings changed.
@@ -119,12 +119,11 @@ class Sampling(Checked):
         return sorted({round(level * strength) for level in all_of_them} | {0, least}, reverse=True)
 
     def strength(self, schedule: "Schedule", guidance: float | None = None) -> "Callable[[int], float]":
-        """The guidance, or another one, by noise level: with early spacing it rises (`rising`)."""
+        """The guidance, or another one, by noise level: with early spacing it rises towards the end (`rising`)."""
         from motionloom.diffusion import rising
 
         scale = self.guidance if guidance is None else guidance
-        factors = (self.late_guidance, self.first_guidance) if self.spacing == "early" else (1, 1)
-        return rising(scale, schedule.steps, *factors)
+        return rising(scale, schedule.steps, LATE_GUIDANCE if self.spacing == "early" else 1)
 
     def seeds(self, count: int) -> list[int]:
         """The seeds of ``count`` motions of one person."""
@@ -174,12 +173,7 @@ class PredictionSampling(Sampling):
 
 @dataclass(frozen=True)
 class PairSampling(Sampling):
-    """How two people are sampled: with no more guidance in the end, else they come into each other more often.
-
-    On the first levels, where it is decided who stands where, a third of what it adds (docs/decisions/0016).
-    """
-
-    late_guidance, first_guidance = 1.0, 1 / 3
+    """How two people are sampled (docs/decisions/0016)."""
 
     pair_guidance: float = declare(
         "number",
@@ -191,3 +185,14 @@ class PairSampling(Sampling):
     bodies: bool = declare(
         "flag", "keep bodies out of each other, and bring hands together that the words say meet", True
     )
+
+    def strength(self, schedule: "Schedule", guidance: float | None = None) -> "Callable[[int], float]":
+        """The guidance, or another one, by noise level: with early spacing less where it is decided who stands where.
+
+        What it adds to 1 is a third as much above four fifths of the levels, and four thirds below; it does not rise in
+        the end as for one person, since people come into each other then.
+        """
+        scale = self.guidance if guidance is None else guidance
+        first, then = _FIRST_AND_THEN if self.spacing == "early" else (1.0, 1.0)
+        decided = 0.8 * schedule.steps
+        return lambda level: scale + max(scale - 1, 0.0) * ((first if level > decided else then) - 1)
