@@ -173,7 +173,7 @@ class PredictionSampling(Sampling):
 
 @dataclass(frozen=True)
 class PairSampling(Sampling):
-    """How two people are sampled (docs/decisions/0016)."""
+    """How two people are sampled (docs/decisions/0016, 0041)."""
 
     pair_guidance: float = declare(
         "number",
