@@ -22,7 +22,7 @@ MAX_FUNCTION_LINES = 75
 MAX_FILE_LINES = 480
 BUDGETS = {
     "lab/suites": 8_556,
-    "tasks": 6_746,
+    "tasks": 6_753,
     "io": 6_161,
     "server": 5_359,
     "goals": 5_314,

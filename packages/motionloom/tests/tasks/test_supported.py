@@ -10,7 +10,7 @@ from motionloom.kinematics.physics import WRISTS, J
 from motionloom.kinematics.stairs import hovering, stairs
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.supported import add_support, add_support_between, climbs
+from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated
 
 FPS = 20.0
 
@@ -93,3 +93,9 @@ def test_steps_come_only_where_they_may_and_other_frames_stay() -> None:
     for at, expected in ((slice(0, 30), rising), (slice(30, 50), whole), (slice(50, 60), rising)):
         assert np.array_equal(part.root[at], expected.root[at])
         assert np.array_equal(part.rotations[at], expected.rotations[at])
+
+
+def test_who_climbed_begins_or_ends_above_the_floor() -> None:
+    up, down = (0, 0.2, 0.33, 0.55, 0.66), (0.7, 0.5, 0.36, 0.19, 0)
+    assert [is_elevated(add_support(climbing(*heights))) for heights in (up, down)] == [True, True]
+    assert not is_elevated(lifted(np.interp(np.arange(60), [20, 30, 40], [0.0, 0.5, 0.0])))

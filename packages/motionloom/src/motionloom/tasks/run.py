@@ -18,7 +18,6 @@ from motionloom.goals.hold import FixedJoints
 from motionloom.goals.remarks import Remark
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import Timeline, single_segment
-from motionloom.kinematics.stairs import stairs
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
@@ -27,7 +26,7 @@ from motionloom.tasks import control, duet, edit, long, pair, predict, reattempt
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
-from motionloom.tasks.supported import add_support, add_support_between, climbs
+from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -215,7 +214,7 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     if (
         plan.previous is not None
         and plan.count == 1
-        and not (_climbs(segments) or stairs(plan.previous[0].positions(), plan.previous[0].fps))
+        and not (_climbs(segments) or is_elevated(plan.previous[0]))
         and (runs := redraw.changed_runs(plan.previous[1], takes[0])) is not None
     ):
         moved = chain_progress(progress, plan.sampling.steps, sum(max(run.end - run.first, 1) for run in runs))

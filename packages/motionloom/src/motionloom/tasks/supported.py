@@ -13,7 +13,7 @@ from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
-from motionloom.kinematics.stairs import hovering
+from motionloom.kinematics.stairs import UP, hovering
 from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
 
@@ -29,6 +29,12 @@ REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
 def climbs(texts: Iterable[str]) -> bool:
     """Whether some words are of stairs, of a ladder, or of climbing."""
     return any(_CLIMB.search(text.lower()) for text in texts)
+
+
+def is_elevated(motion: Motion) -> bool:
+    """Whether somebody begins or ends above the floor for half a second, as who climbs does."""
+    lowest, some = motion.positions()[..., 1].min(axis=1), max(1, round(motion.fps / 2))
+    return max(float(np.median(lowest[:some])), float(np.median(lowest[-some:]))) > UP
 
 
 def add_support(motion: Motion, *, stairs: bool = True) -> Motion:
