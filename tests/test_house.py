@@ -36,7 +36,7 @@ BUDGETS = {
     "live": 2_919,
     "blender/(top)": 2_786,
     "robots": 2_657,
-    "kinematics": 2_599,
+    "kinematics": 2_622,
     "viz": 2_277,
     "edits": 2_117,
     "runtime": 1_970,

@@ -99,3 +99,14 @@ def test_who_climbed_begins_or_ends_above_the_floor() -> None:
     up, down = (0, 0.2, 0.33, 0.55, 0.66), (0.7, 0.5, 0.36, 0.19, 0)
     assert [is_elevated(add_support(climbing(*heights))) for heights in (up, down)] == [True, True]
     assert not is_elevated(lifted(np.interp(np.arange(60), [20, 30, 40], [0.0, 0.5, 0.0])))
+
+
+def test_who_goes_up_and_down_again_comes_back_to_the_floor_and_who_falls_at_once_stays_up() -> None:
+    back = add_support(climbing(0, 0.21, 0.38, 0.55, 0.35, 0.2, 0, 0))
+    flight = stairs(back.positions(), FPS)
+    assert flight is not None
+    assert flight.steps == 3
+    assert (flight.levels[0], flight.levels[-1]) == (0, 0)
+    assert np.abs(np.diff(flight.levels)).max() <= 1
+    assert not is_elevated(back)
+    assert is_elevated(add_support(climbing(0, 0.21, 0.38, 0.55, 0, 0)))

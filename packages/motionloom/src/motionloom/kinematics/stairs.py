@@ -17,6 +17,8 @@ FLIGHT = 0.8
 """Seconds: nobody who jumps is in the air longer."""
 CLIMB = 0.3
 """Metres between the lowest and the highest foothold of stairs."""
+AT_ONCE = 0.4
+"""Metres from one foothold to the next that nobody goes down in one step."""
 RISES = np.arange(0.15, 0.205, 0.005)
 """Metres that steps may be high."""
 _SLOW = 0.6
@@ -67,9 +69,25 @@ def stairs(positions: np.ndarray, fps: float) -> Stairs | None:
     off = [float(np.abs(heights - rise * np.round(heights / rise)).mean()) for rise in RISES]
     rise = round(float(RISES[int(np.argmin(off))]), 3)
     levels = np.maximum(np.round(heights / rise).astype(int), 0).tolist()
-    up = heights[-1] >= heights[0]
-    levels = _one_by_one(levels) if up else _one_by_one(levels[::-1])[::-1]
+    if (top := _turning_point(heights)) is not None:
+        way_up, way_down = _one_by_one(levels[: top + 1]), _one_by_one(levels[top:][::-1])[::-1]
+        levels = [min(level, way_up[-1], way_down[0]) for level in way_up + way_down[1:]]
+    elif heights[-1] >= heights[0]:
+        levels = _one_by_one(levels)
+    else:
+        levels = _one_by_one(levels[::-1])[::-1]
     return Stairs(rise, tuple(holds), tuple(levels))
+
+
+def _turning_point(heights: Array) -> int | None:
+    """The highest foothold of somebody who goes up and, step by step, down again; None of others.
+
+    Who falls to the floor from there at once was not sampled going down: another action follows.
+    """
+    top = len(heights) - 1 - int(np.argmax(heights[::-1]))
+    falls = -np.diff(heights[top:])
+    there_and_back = heights[top] - max(heights[0], heights[-1]) >= CLIMB
+    return top if there_and_back and falls.max() < AT_ONCE else None
 
 
 def _one_by_one(levels: list[int]) -> list[int]:
