@@ -159,7 +159,7 @@ def test_long_motion_is_measured_at_every_length_with_its_settings() -> None:
     assert len(results.times) == 3
     assert all(seconds > 0 for seconds in results.times)
     assert results.peaks_mb == (501.0, 502.0, 503.0)
-    assert [arguments.index("--seconds") - 1 for arguments in calls] == [1, 2, 3]
+    assert [arguments.index("--literal") - 1 for arguments in calls] == [1, 2, 3]
     assert {"prompts": 3, "steps": 2, "together": 16, "published_handshake": 20}.items() <= results.settings.items()
 
 
