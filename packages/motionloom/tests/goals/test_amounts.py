@@ -85,6 +85,20 @@ def test_numbers_with_units_are_read(text: str) -> None:
     assert str(read_amount(text)) == READ[text]
 
 
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("he turns around", "a turn of 180 degrees to the left"),
+        ("turns around to face the other way", "a turn of 180 degrees to the left"),
+        ("turn around to the right", "a turn of 180 degrees to the right"),
+        ("she turns around the corner", "None"),
+        ("he turns around twice", "a turn of 720 degrees to the left"),
+    ],
+)
+def test_between_other_actions_turning_around_is_half_a_turn(text: str, read: str) -> None:
+    assert str(read_amount(text, around=True)) == read
+
+
 @pytest.mark.parametrize("text", UNREAD)
 def test_what_may_mean_something_else_is_not(text: str) -> None:
     assert read_amount(text) is None

@@ -55,6 +55,25 @@ def with_leg(side: int, *, knee: float = 0.0, ankle: float = 0.0) -> np.ndarray:
     return p
 
 
+def with_arms_out() -> np.ndarray:
+    p = walking(1.2)
+    for hand, side in ((J["left_wrist"], 0.6), (J["right_wrist"], -0.6)):
+        p[:, hand] = p[:, J["neck"]] + [side, -0.1, 0]
+    return p
+
+
+def at_shoulders() -> np.ndarray:
+    return with_hands(0, 1, at=lambda p: p[:, J["neck"]] - [0, 0.1, 0])
+
+
+def lying(up: int) -> np.ndarray:
+    """Somebody who lies on the back (1) or on the belly (-1)."""
+    p = standing()
+    height, ahead = p[..., 1].copy(), p[..., 2].copy()
+    p[..., 1], p[..., 2] = 0.1 + up * ahead, -up * height
+    return p
+
+
 def rising(p: np.ndarray, metres: float) -> np.ndarray:
     return p + np.linspace(0, metres, len(p))[:, None, None] * [0, 1, 0]
 
@@ -74,7 +93,7 @@ def rising(p: np.ndarray, metres: float) -> np.ndarray:
         ("a person turns around", turning(178), turning(57)),
         ("a person turns around", turning(178), turning(355)),
         ("a dancer spins", turning(360), turning(170)),
-        ("a man walks in place", standing(), walking(1.2)),
+        ("a man walks in place", with_leg(0, knee=0.05), walking(1.2)),
         ("a girl waves with her left hand", waving(0), waving(1)),
         ("she waves", waving(1), standing()),
         ("he raises the right arm", raising(1), raising(0, 1)),
@@ -89,6 +108,12 @@ def rising(p: np.ndarray, metres: float) -> np.ndarray:
         ("a man lifts his right knee up", with_leg(1, knee=0.05), with_leg(0, knee=0.05)),
         ("she raises the left leg", with_leg(0, ankle=0.3), with_leg(1, ankle=0.3)),
         ("a man walks up the stairs", rising(walking(0.6), 0.5), walking(0.6)),
+        ("a man sneaks", walking(0.6), walking(0.2)),
+        ("a man falls backwards", lying(1), walking(-1.2)),
+        ("he walks with his arms out", with_arms_out(), walking(1.2)),
+        ("she lowers the left arm", raising(1), raising(0)),
+        ("he raises both arms to shoulder height", at_shoulders(), standing()),
+        ("he lies down on his back", lying(1), lying(-1)),
         ("he drinks", with_hands(0, at=lambda p: p[:, J["head"]] + [0, 0, 0.15]), standing()),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -121,10 +146,10 @@ def test_what_nothing_can_be_checked_of_is_met(text: str) -> None:
 
 
 def test_a_side_of_limbs_is_no_way() -> None:
-    """A kick with the left leg turns nowhere, and who runs in place goes nowhere."""
+    """A kick with the left leg turns nowhere, and who runs in place goes nowhere but hops."""
     names = [one.name for one in expectations_of("a person kicks with the left leg")]
     assert names == ["kicks", "kicks of the left side alone"]
-    assert [one.name for one in expectations_of("a person runs in place")] == ["staying in place"]
+    assert [one.name for one in expectations_of("a person runs in place")] == ["staying in place", "hops"]
     assert asks_for_rest("a person stands and waits")
     assert not asks_for_rest("a person jumps")
 

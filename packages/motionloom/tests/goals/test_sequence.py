@@ -18,7 +18,7 @@ SEQUENCES = {
     "a person walks to a chair and sits down": ["a person walks to a chair", "a person sits down"],
     "a person stands up and walks away": ["a person stands up", "a person walks away"],
     "a person walks forward and stops": ["a person walks forward", "a person stops"],
-    "a person sits down and waves": ["a person sits down", "a person waves"],
+    "a person sits down and waves": ["a person sits down", "a person sits and waves"],
     "a person walks forward and turns around": ["a person walks forward", "a person turns around"],
     "a person turns left and walks": ["a person turns left", "a person walks"],
     "a person walks and runs": ["a person walks", "a person runs"],
@@ -43,7 +43,7 @@ SEQUENCES = {
     "a person picks up a box, walks forward and puts it down": [
         "a person picks up a box",
         "a person walks forward",
-        "a person puts it down",
+        "a person puts the box down",
     ],
     "a person walks forward then does a handstand": ["a person walks forward", "a person does a handstand"],
     "a person walks and waves and then sits down": ["a person walks and waves", "a person sits down"],

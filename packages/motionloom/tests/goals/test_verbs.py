@@ -43,6 +43,12 @@ from motionloom.goals.verbs import MOODS, PLAINER, base_of, in_plainer_words, ki
         ("slams on the brakes", "stops"),
         ("crawling backward on her hands and knees", "crawling backwards on all fours"),
         ("a backward roll", "a backward roll"),
+        ("a soldier falls backward", "a soldier falls down backwards"),
+        ("tired walk, shoulders slumped", "tired walk, shoulders slumped"),
+        ("he is limping, his right leg hurts", "he is walking slowly"),
+        ("she jogs on the spot, happily", "she hops from one foot to the other, happily"),
+        ("walks along a tightrope", "walks along a line"),
+        ("someone slowly lowers both arms again", "someone slowly stands"),
         # nouns, and what is common already
         ("a guard on patrol walks", "a guard on patrol walks"),
         ("the march home", "the march home"),

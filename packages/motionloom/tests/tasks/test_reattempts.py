@@ -15,12 +15,11 @@ from motionloom.requests.tasks import Compose
 from motionloom.tasks import reattempts
 from motionloom.tasks import run as tasks
 from motionloom.tasks.long import compose
-from motionloom.tasks.reattempts import Reattempted, reattempt
+from motionloom.tasks.reattempts import Reattempted, attempt_seed, reattempt
 from motionloom.tasks.redraw import Run, Timed, resample_runs
 from motionloom.tasks.run import Models, Plan, run
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import Denoised, watching
-from motionloom.tasks.worded import attempt_seed
 from motionloom.weights.prior import Prior
 from tests.tasks.test_redraw import STEPS, prior, sampled, straight, timed
 
@@ -48,7 +47,7 @@ def lines(found: Reattempted) -> list[str]:
 
 
 def test_a_block_that_shows_its_words_from_another_seed_is_of_that_one(prior: Prior, looks: Any) -> None:
-    looks["a man walks"] = [1, 1, 0]
+    looks["a man trudges"] = [1, 1, 0]
     timeline = timed(prior, SEGMENTS)
     old, seen = sampled(timeline), []
     with watching(seen.append):
@@ -77,7 +76,7 @@ def test_what_no_attempt_shows_stays_as_it_was_and_is_reported(prior: Prior, loo
 
 
 def test_an_attempt_that_spoils_a_neighbour_is_not_kept(prior: Prior, looks: Any) -> None:
-    looks["a person walks"], looks["a man walks"] = [0, 1], [1, 0]
+    looks["a person walks"], looks["a man trudges"] = [0, 1], [1, 0]
     timeline = timed(prior, SEGMENTS)
     old = sampled(timeline)
     found = reattempt(timeline, old, range(3))
@@ -86,7 +85,7 @@ def test_an_attempt_that_spoils_a_neighbour_is_not_kept(prior: Prior, looks: Any
 
 
 def test_of_one_block_an_attempt_is_the_motion_of_its_seed(prior: Prior, looks: Any) -> None:
-    looks["a man walks"] = [2, 1, 2]
+    looks["a man trudges"] = [2, 1, 2]
     timeline = timed(prior, SEGMENTS[1:2], seed=5)
     found = reattempt(timeline, sampled(timeline), [0])
     plain = replace(SEGMENTS[1], text="a man walks")
@@ -96,7 +95,7 @@ def test_of_one_block_an_attempt_is_the_motion_of_its_seed(prior: Prior, looks: 
 
 
 def test_goals_paths_and_what_goes_on_from_a_motion_are_left_alone(prior: Prior, looks: Any) -> None:
-    for text in ("a person walks", "a man walks", "a person sits"):
+    for text in ("a person walks", "a man trudges", "a person sits"):
         looks[text] = [1]
     goal = Goal.nothing(FRAMES)
     goal.positions[20, 0], goal.mask[20, 0, ::2] = (0.0, 0.0, 0.4), True
@@ -129,14 +128,14 @@ def motion_of(plan: Plan, prior: Prior) -> tuple[Motion, list[str], list[tuple[i
 def test_a_request_is_held_against_its_words_unless_it_is_literal_or_long(
     prior: Prior, looks: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looks["a man walks"] = [1, 0]
+    looks["a man trudges"] = [1, 0]
     timeline, sampling = Timeline(SEGMENTS), Sampling(steps=STEPS, count=1)
     plan = Plan(task="compose", values=Compose(timeline=timeline), sampling=sampling, timeline=timeline)
     motion, remarks, reports = motion_of(plan, prior)
     assert remarks == ["'a man trudges' is generated as 'a man walks', which these weights know better"]
     assert reports[-1] == (9, 9)
     assert reports.count((9, 9)) > 1
-    looks["a man walks"] = [1, 0]
+    looks["a man trudges"] = [1, 0]
     literal = replace(plan, values=Compose(timeline=timeline, literal=True))
     first, nothing, _ = motion_of(literal, prior)
     assert nothing == []
@@ -162,7 +161,7 @@ def test_only_changed_blocks_are_sampled_again_and_all_are_reported(
     before, sampling = timed(prior, SEGMENTS, count=1), Sampling(steps=STEPS, count=1)
     old = sampled(before)
     segments = (SEGMENTS[0], SEGMENTS[1], replace(SEGMENTS[2], text="a person jumps"))
-    for text in ("a person walks", "a man walks", "a person jumps"):
+    for text in ("a person walks", "a man trudges", "a person jumps"):
         looks[text] = [1]
     timeline = Timeline(segments)
     plan = Plan(

@@ -45,6 +45,8 @@ class Amount:
     """Whether an arc is walked backwards."""
     of: Counted | None = None
     """What is repeated."""
+    in_place: bool = False
+    """Whether repetitions stay in one place: jumps that go nowhere in the words, and which the weights take along."""
     metre: float = 1.0
     """Metres of ``size`` that one of the 22-joint person's becomes."""
 
@@ -94,6 +96,11 @@ _WAY = re.compile(
 )
 _DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
 _PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
+_TURNS_ROUND = re.compile(
+    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:around|round|about)"
+    r"(?= *$|[,.]| to (?:face|go|walk|run|the (?:left|right|other|opposite))| (?:again|\w+ly|once)\b)"
+)
+"""A half turn, unless another size is said."""
 _TURNS_OFTEN = re.compile(rf"\b{NUMBER} (?:full |complete |whole )?(?:turns|spins|pirouettes|rotations)\b")
 _ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi|full|complete|whole|0\.5)(?: of a)?[ -]?circles?\b")
 _CIRCLE = re.compile(r"\bin a circle\b")
@@ -125,6 +132,11 @@ _MANY = re.compile(
     r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|bows?|claps?)\b"
 )
 MOST_TIMES = 12
+_TRAVELS = re.compile(
+    r"\b(?:forwards?|ahead|back|backwards?|over|across|along|towards?|around|onto|from|to|far|long|left|right|sideways"
+    r"|through|off|down the|up the|(?:run|walk|jog|skip|hop)\w*)\b"
+)
+"""Words of jumps that go somewhere."""
 _SINGLE: dict[Counted, str] = {
     "jumps": "jump",
     "hops": "hop",
@@ -140,6 +152,8 @@ _BODY = re.compile(
     r"\b(?:arms?|hands?|heads?|legs?|foot|knees?|wrists?|elbows?|hips?|waist|torso|shoulders?"
     r"|neck|palms?|body|trunk)\b"
 )
+_HELD = re.compile(r"\bwith (?:the |his |her |their |both |your )?(?:arms|hands)\b")
+"""What is held in some way while the whole body turns."""
 _ELSE = re.compile(
     r"\b(?:stairs?|staircase|ladder|hill|back and forth|to and fro|zig-?zags?|in circles?|in a"
     r" (?:\w+ )?circle|around|dances?"
@@ -172,10 +186,11 @@ _GOING = {"walk", "stroll", "step", "go", "move", "pace", "stride", "wander", "b
 _STEPPING = {"take", "make", "walk", "go", "move", "step", "march", "run", "sidestep", "stroll", "back"}
 
 
-def read_amount(text: str) -> Amount | None:
+def read_amount(text: str, *, around: bool = False) -> Amount | None:
     """The turn, way, steps, arc or repetitions that the words of one action ask for in numbers; None without.
 
-    text: one action (`motionloom.goals.sequence.split_actions`).
+    text: one action (`motionloom.goals.sequence.split_actions`). around: whether to turn around is a turn of 180
+    degrees, as between other actions, where the weights alone turn too little.
     """
     phrase = in_digits(text)
     verbs = [base for word in re.findall(r"[a-z]+", phrase) if word != "left" and (base := base_of(word))]
@@ -185,7 +200,7 @@ def read_amount(text: str) -> Amount | None:
         return repetitions
     if not verbs or {kind_of_verb(verb, phrase) for verb in verbs} & {"jump", "fight", "dance"}:
         return None
-    return _turn(phrase, verbs) or _arc(phrase, verbs) or _steps(phrase, verbs) or _distance(phrase, verbs)
+    return _turn(phrase, verbs, around) or _arc(phrase, verbs) or _steps(phrase, verbs) or _distance(phrase, verbs)
 
 
 def read_seconds(text: str) -> float | None:
@@ -223,21 +238,26 @@ def _repetitions(phrase: str) -> Amount | None:
     size = float(many[0][1]) if many else _repeat_count(*often[0])
     if not 1 <= size <= MOST_TIMES or size != int(size):
         return None
-    return Amount("count", size, _side(phrase) or "forward", of=kinds.pop())
+    of = kinds.pop()
+    in_place = of == "jumps" and not _TRAVELS.search(phrase)
+    return Amount("count", size, _side(phrase) or "forward", of=of, in_place=in_place)
 
 
 def _repeat_count(word: str, number: str) -> float:
     return {"once": 1.0, "twice": 2.0, "thrice": 3.0}.get(word) or float(number)
 
 
-def _turn(phrase: str, verbs: list[str]) -> Amount | None:
-    if not _TURNS & set(verbs) or _BODY.search(phrase) or set(verbs) & {"throw", "look"}:
+def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
+    if not _TURNS & set(verbs) or _BODY.search(_HELD.sub("", phrase)) or set(verbs) & {"throw", "look"}:
         return None
     matches, part = list(_DEGREES.finditer(phrase)), _PART_OF_TURN.search(phrase)
     often = _TURNS_OFTEN.search(phrase) or _OFTEN.search(_OFTEN_OF_LIMBS.sub(" ", phrase))
-    if len(matches) > 1 or bool(matches) + bool(part) + bool(often) != 1:
+    sizes = len(matches) + bool(part) + bool(often)
+    if sizes > 1 or not (sizes or (around and _TURNS_ROUND.search(phrase))):
         return None
-    if often:
+    if not sizes:
+        degrees = 180.0
+    elif often:
         degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _repeat_count(often[1], often[2]))
     else:
         parts = {"half": 180.0, "0.5": 180.0, "quarter": 90.0, "full": 360.0}
@@ -397,6 +417,13 @@ def goal_for(amount: Amount, seconds: float) -> Goal:
         toward = {"forward": (0.0, 1.0), "backward": (0.0, -1.0), "left": (1.0, 0.0), "right": (-1.0, 0.0)}
         x, z = (amount.metres * share * part for part in toward[amount.direction])
     goal.positions[:, 0, 0], goal.positions[:, 0, 2] = x, z
+    goal.mask[:, 0, [0, 2]] = True
+    return goal
+
+
+def goal_in_place(seconds: float) -> Goal:
+    """The goal of staying where one is: the pelvis over one place of the floor."""
+    goal = Goal.nothing(round(seconds * FPS))
     goal.mask[:, 0, [0, 2]] = True
     return goal
 

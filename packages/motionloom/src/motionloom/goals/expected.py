@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
-from motionloom.goals.verbs import base_of, kind_of_verb
+from motionloom.goals.verbs import base_of, in_plainer_words, kind_of_verb
 from motionloom.kinematics.counts import Side, count
 from motionloom.kinematics.gestures import (
     foot_lifts,
@@ -42,8 +42,8 @@ from motionloom.motion import heading
 
 Check = Callable[[Array, float], bool]
 """(positions (frames, 22, 3) metres, frames per second) to whether something is done."""
-_GOES = 0.6
-"""Metres that somebody goes who goes anywhere."""
+_GOES, _PACE, _FAR = 0.6, 0.25, 1.25
+"""Metres that somebody goes who goes anywhere, metres per second who goes on for longer, and the most that is asked."""
 _BRISK, _SLOW, _RUNS = 1.4, 1.0, 2.0
 """m/s above which a walk is fast, below which it is slow, that somebody reaches who runs."""
 _TURNS, _TURNS_ROUND, _SPINS = np.radians(25), (np.radians(120), np.radians(240)), np.radians(300)
@@ -55,10 +55,13 @@ _UPRIGHT, _FLAT = np.radians(50), np.radians(60)
 _FACES = np.radians(60)
 _KNEE = 0.15
 """Leg lengths that a knee which is pulled up may be below the hip."""
+_HANGS, _SPREAD = 0.15, 0.4
+"""Metres that a hanging hand is over the pelvis at most, and that hands of arms that are out are away from it."""
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
 _GAIT = (
-    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|pace|step)"
+    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|pace|step"
+    r"|stumbl)"
     r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b"
 )
 _BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing) (?:up|away)|few steps back)\b|^back (?:up|away)\b"
@@ -72,6 +75,9 @@ _TUMBLES = (
     r"|rolls? (?:over|forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
 )
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
+_FALLS = r"\b(?:falls?|falling|fell|collapses?|collapsing)\b(?! (?:asleep|behind|back|in love|silent)\b)"
+_ARMS_OUT = r"\barms (?:\w+ )?(?:out\b|spread|outstretched|stretched)(?! (?:of|up|over|above))"
+_LEVEL = r"\b(?:shoulders?|chest|t-?pose|sides?|sideways|out|front)\b"
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
 
 
@@ -128,12 +134,15 @@ def asks_for_rest(text: str) -> bool:
 
 
 def expectations_of(text: str) -> list[Expectation]:
-    """What can be checked of the words of one action."""
-    phrase = _Phrase(text.lower())
-    limb: Side = phrase.side if phrase.has(_LIMB) else ""
-    way: Side = "" if limb else phrase.side
-    parts = (_repeated(phrase, limb), _ways(phrase, way), _postures(phrase), _arms(phrase, limb), _whole_body(phrase))
-    return [Expectation(name, check) for part in parts for name, check in part]
+    """What can be checked of the words of one action, and of common words for its rare ones."""
+    found: dict[str, Check] = {}
+    for words in dict.fromkeys((in_plainer_words(text), text)):
+        phrase = _Phrase(words.lower())
+        limb: Side = phrase.side if phrase.has(_LIMB) else ""
+        way: Side = "" if limb else phrase.side
+        parts = _repeated(phrase, limb), _ways(phrase, way), _postures(phrase), _arms(phrase, limb), _whole_body(phrase)
+        found = dict(named for part in parts for named in part) | found
+    return [Expectation(name, check) for name, check in found.items()]
 
 
 _Named = tuple[str, Check]
@@ -182,7 +191,7 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
             ("a way down" if falls else "a way up"),
             lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > _FLIGHT,
         )
-    elif phrase.has(f"{_GAIT}|{_BACKWARDS}") and not turns:
+    elif phrase.has(f"{_GAIT}|{_BACKWARDS}") and not turns and not phrase.has(_FALLS):
         yield _direction(phrase, side, sign)
     yield from _paces(phrase)
 
@@ -194,7 +203,8 @@ def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
         return f"a way to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES
     if phrase.has(r"\b(?:forwards?|ahead)\b") and not side:
         return "a way forward", lambda p, fps: displacement(p, fps).forward > _GOES
-    return "a way", lambda p, fps: travel(p, fps) > _GOES
+    short = phrase.has(r"\bstep|\b(?:stand|start|stop|wait)")
+    return "a way", lambda p, fps: travel(p, fps) > (_GOES if short else min(max(_GOES, _PACE * len(p) / fps), _FAR))
 
 
 def _paces(phrase: _Phrase) -> Iterator[_Named]:
@@ -222,13 +232,16 @@ def _postures(phrase: _Phrase) -> Iterator[_Named]:
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
     ):
         yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > _FLAT), 0.5, fps)
+        if up := re.search(r"\bon (?:the|his|her|their|its|your|my) (back|stomach|belly|front)\b", phrase.text):
+            yield f"lying on the {up[1]}", lambda p, fps: (_faces_up(p, fps) > 0) == (up[1] == "back")
     if phrase.has(r"\b(?:crouch|kneel|squat|duck)"):
         yield "going low", lambda p, fps: float(pelvis_height(p).min()) < _LOW
     if phrase.has(
         r"\b(?:gets?|getting|stands?|standing|rises?) (?:back )?(?:up\b|on(?:to)? (?:the|his|her|their) feet)"
     ):
         yield "standing at the end", lambda p, fps: float(pelvis_height(p)[-max(1, round(fps / 4)) :].mean()) > _UP
-    if match := re.search(r"\bon (?:one|(?:the |his |her |their )?(left|right)) (?:leg|foot)\b", phrase.text):
+    on_one_leg = r"\bon (?:one|(?:the |his |her |their )?(left|right)) (?:leg|foot)\b"
+    if (match := re.search(on_one_leg, phrase.text)) and phrase.kinds <= {"state", "gesture", "other"}:
         lifted = [0, 1] if match[1] is None else [1] if match[1] == "left" else [0]
         yield "standing on one leg", lambda p, fps: any(_lasts(foot_lifts(p)[:, one] > 0.1, 1.0, fps) for one in lifted)
 
@@ -240,13 +253,18 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         r"\b(?:rais|lift|puts?|putting|holds?)\w* (?:up )?(?:\w+ ){0,3}(?:arm|hand)s?\b", r"rais|lift|\bup\b"
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
+        joint = "spine3" if phrase.has(_LEVEL) else "neck"
         yield (
             "a raised arm",
             lambda p, fps: (
-                (all if both else any)(_lasts(_over(p, "neck")[:, hand], 0.3, fps) for hand in hands)
+                (all if both else any)(_lasts(_over(p, joint)[:, hand], 0.3, fps) for hand in hands)
                 and not any(_lasts(_over(p, "neck")[:, hand], 0.3, fps) for hand in rest)
             ),
         )
+    if phrase.has(r"\b(?:lower|drop)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b"):
+        yield "a lowered arm", lambda p, fps: float(hands_height(p[-1:], over="pelvis")[:, list(hands)].max()) < _HANGS
+    if phrase.has(_ARMS_OUT):
+        yield "arms out", lambda p, fps: _lasts(_arms_out(p), 0.4 * len(p) / fps, fps)
     if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:\w+ ){0,2}knees?\b"):
         yield "a raised knee", lambda p, fps: any(_lasts(_knees(p)[:, hand] > -_KNEE, 0.2, fps) for hand in hands)
     if phrase.has(r"\b(?:rais|lift)\w* (?:up )?(?:\w+ ){0,3}(?:leg|foot)\b"):
@@ -272,8 +290,8 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
     if phrase.has(r"\bcrawl|\ball fours\b"):
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
-    if phrase.has(r"\b(?:fall|falls|collapse)") and phrase.has(r"\b(?:down|floor|ground|over)\b"):
-        yield "a fall", lambda p, fps: float(_over_floor(p)[-max(1, round(fps / 4)) :].mean()) < _DOWN
+    if phrase.has(_FALLS):
+        yield "a fall", lambda p, fps: _lasts(_over_floor(p) < _DOWN, 0.25, fps)
 
 
 def _lasts(mask: np.ndarray, seconds: float, fps: float) -> bool:
@@ -307,6 +325,18 @@ def _near(p: Array, joint: str) -> np.ndarray:
 def _knees(p: Array) -> Array:
     """(frames, 2) leg lengths of the left and the right knee over the hips."""
     return (p[:, [J["left_knee"], J["right_knee"]], 1] - p[:, [J["left_hip"], J["right_hip"]], 1]) / leg_length(p)
+
+
+def _faces_up(p: Array, fps: float) -> float:
+    """How far up the chest faces in the last quarter of a second: above 0 on the back, below on the belly."""
+    across = p[:, J["left_shoulder"]] - p[:, J["right_shoulder"]]
+    return float(np.cross(across, p[:, J["neck"]] - p[:, 0])[-max(1, round(fps / 4)) :, 1].mean())
+
+
+def _arms_out(p: Array) -> np.ndarray:
+    """(frames,) whether both hands are away from the body, to the sides or ahead."""
+    hands = in_body(p)[:, list(WRISTS)]
+    return np.hypot(hands[..., 0], hands[..., 2]).min(axis=1) > _SPREAD
 
 
 def _between_hands(p: Array) -> Array:

@@ -44,7 +44,7 @@ _THEN = re.compile(
     r"|(?:a|one|some) (?:short |little )?(?:moment|second|instant|while|bit) later|(?:moments|seconds) later"
     r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?"
     r"(?:after (?:a|some|one) (?:short |little |brief )?(?:moment|while|second|pause|bit|time)\b\s*,?\s*)?"
-    r"|\s*[.;]\s+(?=\S)",
+    r"|\s*,?\s+and after,?\s+(?=(?:he|she|they)\b)|\s*[.;]\s+(?=\S)",
     re.IGNORECASE,
 )
 _NO_SEPARATOR = re.compile(
@@ -69,7 +69,9 @@ _LASTS = re.compile(
     re.IGNORECASE,
 )
 """Predicates of somebody who goes on being as they are."""
-_POSTURES = ("sit", "lie", "lay", "kneel", "crouch", "squat")
+_POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch": "crouch", "squat": "crouch"}
+"""Verbs of who ends up low, and of who is: the weights know nobody who stays in a squat."""
+_WHERE_LOW = re.compile(r"\bon (?:the|his|her|their|its) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE)
 
 
 def split_actions(text: str) -> tuple[Part, ...]:
@@ -105,8 +107,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
     if not 1 < len(parts) <= MOST_PARTS:
         return (Part(text, natural_seconds(text)),)
     last = len(parts) - 1
-    timed = [Part(part, _part_seconds(part) if i < last else natural_seconds(part)) for i, part in enumerate(parts)]
-    rested = _merge_rests(timed)
+    seconds = [_part_seconds(part) if i < last else natural_seconds(part) for i, part in enumerate(parts)]
+    rested = _merge_rests([Part(*both) for both in zip(_keep_postures(parts), seconds, strict=True)])
     return tuple(rested) if len(rested) > 1 else (Part(text, rested[0].seconds),)
 
 
@@ -114,8 +116,9 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
     """Parts in which a posture lasts as long as the rest that follows it: "sits down and waits"."""
     result: list[Part] = []
     for part in parts:
-        lasts = _LASTS.match(part.text.removeprefix(subject_of(part.text)).strip())
-        if lasts and result and _is_posture(result[-1].text):
+        rest = part.text.removeprefix(subject_of(part.text)).strip()
+        before = _first_verb(result[-1].text) if result else "walk"
+        if (_LASTS.match(rest) and before in _POSTURES) or (_STAYS.match(rest) and before not in _WALKS):
             both = result[-1].seconds + part.seconds
             result[-1] = Part(result[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
         else:
@@ -123,10 +126,30 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
     return result
 
 
-def _is_posture(part: str) -> bool:
-    """Whether somebody ends up low and can stay so."""
+def _first_verb(part: str) -> str:
     rest = part.removeprefix(subject_of(part)).strip()
-    return verb_of(rest, mood_of(rest)) in _POSTURES
+    return verb_of(rest, mood_of(rest))
+
+
+def _keep_postures(parts: Sequence[str]) -> list[str]:
+    """Parts in which who sat, lay or knelt down does so while gesturing: "sits down, waves" as "... sits and waves"."""
+    result, posture, place = [], "", ""
+    for part in parts:
+        named = subject_of(part)
+        rest = part.removeprefix(named).strip()
+        mood, verb = mood_of(rest), _first_verb(part)
+        if _STAYS.match(rest):
+            pass
+        elif verb in _POSTURES or (verb == "take" and _SEATED.search(rest)):
+            posture = _POSTURES.get(verb, "sit")
+            where = _WHERE_LOW.search(rest)
+            place = f" {where[0]}" if where and posture in ("sit", "lie") else ""
+        elif posture and kind_of(part, mood) == "gesture":
+            part = f"{named} {_form(posture, mood)}{place} and {rest}".strip()
+        elif not _WAITS.match(rest):
+            posture = ""
+        result.append(part)
+    return result
 
 
 def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float = 20.0) -> list[float]:
@@ -175,7 +198,7 @@ def _split_by_time(text: str) -> list[str]:
             return [clause for one in _with_subject(order, main) for clause in _split_by_time(one)]
     for match in re.finditer(r"\s*,?\s+(before|after)\s+", text, re.IGNORECASE):
         main, inner = text[: match.start()], text[match.end() :]
-        if _is_clause(inner) and main.strip():
+        if _is_clause(inner) and main.strip() and not main.endswith(" and"):
             inner = _with_subject([inner], main)[0]
             order = [main, inner] if match[1].lower() == "before" else [inner, main]
             return [order[0], *_split_by_time(order[1])] if match[1].lower() == "before" else order
@@ -309,7 +332,7 @@ _RISES_AGAIN = re.compile(r"(?:stand|get|push|rise)s? (?:right |straight )?(?:ba
 """The end of a squat, which is no squat without."""
 _STAYS = re.compile(
     r"(?:stay|remain)s? (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
-    r"|holds? (?:it|that|this|still|(?:the|this|that) po(?:se|sition))",
+    r"|holds? (?:it(?! \w+ (?:his|her|their|the) )|that|this|still|(?:the|this|that) po(?:se|sition))(?= *$| for )",
     re.IGNORECASE,
 )
 _TOGETHER = (
@@ -332,6 +355,14 @@ _COMES_UP = re.compile(
 )
 """What only ends each of several repetitions: "squats down and comes back up three times"."""
 _BACK_AGAIN = re.compile(r"(walk|run|jog|come|go)(?:es|s)? back\b.*|returns?\b.*", re.IGNORECASE)
+_OBJECT = re.compile(
+    r"(?<=\w )((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+)"
+    r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again)\b)",
+    re.IGNORECASE,
+)
+"""A thing that something is done with: what "it" and "them" mean behind it."""
+_NO_OBJECT = re.compile(r"(?:the|his|her|their|an?) (?:floor|ground|left|right|front|back|side|step)$", re.IGNORECASE)
+_STAIRS = re.compile(r"\bstairs?\b|\bstaircase\b", re.IGNORECASE)
 _TURNED = re.compile(r"\bturn(?:s|ed)? (?:around|round|about|back)\b", re.IGNORECASE)
 _SEATED = re.compile(r"\b(?:sits?|seat)\b", re.IGNORECASE)
 _ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
@@ -353,7 +384,7 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
         if _only_ends(before, rest):
             result[-1] = f"{before} and {rest}"
         else:
-            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(before, rest)}".strip())
+            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(result, rest)}".strip())
     return result
 
 
@@ -380,16 +411,23 @@ def _with_repeated_words(before: str, part: str) -> str:
     return ""
 
 
-def _rephrased(before: str, rest: str) -> str:
-    """The action in words that make sense without the sentence before."""
-    mood = mood_of(rest) or "third"
+def _rephrased(parts: Sequence[str], rest: str) -> str:
+    """The action in words that make sense without the parts before."""
+    mood, before = mood_of(rest) or "third", parts[-1]
     back = _BACK_AGAIN.fullmatch(rest)
+    if back and (on := re.fullmatch(r"\w+ back (up|down)", rest)) and any(map(_STAIRS.search, parts)):
+        return f"{_form('walk', mood)} {on[1]} the stairs"
     if back and _TURNED.search(before):
         moves = (back[1] or "walk").lower()
         return f"{_form('walk' if moves in ('come', 'go') else moves, mood)} forward"
     if (_UP_AGAIN.fullmatch(rest) or _ENDS.fullmatch(rest)) and _SEATED.search(before):
         return f"{_form('stand', mood)} up{' from the floor' if _ON_THE_FLOOR.search(before) else ' again'}"
-    return rest
+    if _STAYS.match(rest):
+        return rest
+    named = [[one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] for part in reversed(parts)]
+    things = next(filter(None, named), [""])
+    thing = re.sub(r"^(?:an?|some|another|one)\b", "the", things[0], flags=re.IGNORECASE)
+    return re.sub(r"^((?:\w+ly )?\w+) (?:it|them)\b", rf"\1 {thing}", rest, count=1) if thing else rest
 
 
 def _form(base: str, mood: str) -> str:

@@ -19,6 +19,7 @@ from motionloom.goals.amounts import (
     STROKES,
     Amount,
     goal_for,
+    goal_in_place,
     read_amount,
     read_seconds,
     seconds_for,
@@ -176,7 +177,8 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
 
 def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre: float) -> Timeline:
     """As long as the numbers in the words need, with their goals; without one as `_timeline_of_parts`."""
-    read = [amount and replace(amount, metre=metre) for amount in (read_amount(part.text) for part in parts)]
+    found = (read_amount(part.text, around=len(parts) > 1) for part in parts)
+    read = [amount and replace(amount, metre=metre) for amount in found]
     amounts = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
     own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, amounts, strict=True)]
     if not any(own):
@@ -210,7 +212,8 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
         return (replace(segment, text=text, seconds=_in_whole_frames(min(segment.seconds, LONGEST) * share)),)
     stroke = _in_whole_frames(min(stroke, each * share))
     between = min(TRANSITION, segment.transition, stroke / 2)
-    return (replace(segment, text=text, seconds=stroke, transition=between),) * number
+    goal = goal_in_place(stroke) if amount.in_place else None
+    return (replace(segment, text=text, seconds=stroke, transition=between, goal=goal),) * number
 
 
 def in_seconds(segments: Sequence[Segment], seconds: float) -> tuple[Segment, ...]:
@@ -218,12 +221,18 @@ def in_seconds(segments: Sequence[Segment], seconds: float) -> tuple[Segment, ..
     left = seconds - sum(one.seconds for one in segments)
     if left < 0:
         each = seconds / len(segments)
-        return tuple(replace(one, seconds=each, transition=min(one.transition, each / 2)) for one in segments)
+        return tuple(_lasting(one, each) for one in segments)
     *before, last = segments
     if left < REST:
-        return (*before, replace(last, seconds=last.seconds + left))
+        return (*before, _lasting(last, last.seconds + left))
     standing = f"{subject_of(last.text) or 'a person'} stands still"
     return (*segments, Segment(standing, left, transition=min(TRANSITION, last.seconds / 2, left / 2)))
+
+
+def _lasting(stroke: Segment, seconds: float) -> Segment:
+    """A stroke of so many seconds."""
+    goal = None if stroke.goal is None else goal_in_place(seconds)
+    return replace(stroke, seconds=seconds, transition=min(stroke.transition, seconds / 2), goal=goal)
 
 
 def _timeline_of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:

@@ -111,11 +111,14 @@ def kind_of_verb(word: str, phrase: str) -> str:
 
 
 _NAMED = re.compile(r"\b(?:an?|the|this|that|one|his|her|its|their|my|your|of|on|in|at|with) $", re.IGNORECASE)
+_OF_THE_BODY = re.compile(r"\b(?:arm|leg|shoulder|hand|back|head|body|knee|spine|chest|torso)s? $", re.IGNORECASE)
 
 
 def _is_verb(mood: str, before: str) -> bool:
     """Whether a form of that mood is a verb behind those words, rather than a noun."""
     if mood == "base" and not re.search(r"(?:^|[.,;]|\bto|\bthen|\band)\s*$", before, re.IGNORECASE):
+        return False
+    if mood == "past" and _OF_THE_BODY.search(before):  # "shoulders slumped"
         return False
     return not _NAMED.search(before)
 

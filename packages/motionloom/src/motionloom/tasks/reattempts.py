@@ -1,28 +1,43 @@
 """Blocks of a timeline that do not show what their words say plainly are sampled again, between frames that stay.
 
-What `motionloom.tasks.worded` does with a sentence. A block is held against its words (`motionloom.goals.expected`).
-Where something is missing it is sampled from up to three other seeds, with a common verb for each rare one, as if it
-had been changed (`motionloom.tasks.redraw`), and the sample with the least missing stays.
+What `motionloom.tasks.worded` does with sentences of one action. A block is held against its words
+(`motionloom.goals.expected`). Where something is missing it is sampled from up to three other seeds, with a common verb
+for each rare one, as if it had been changed (`motionloom.tasks.redraw`), and the sample with the least missing stays.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 
+from motionloom.diffusion.sampling import row_seed
 from motionloom.goals.expected import missing
 from motionloom.goals.remarks import Remark
 from motionloom.goals.segment import Segment
 from motionloom.goals.verbs import in_plainer_words
 from motionloom.motion import Motion
+from motionloom.requests.sampling import LARGEST_SEED
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Run, Timed, resample_runs
 from motionloom.tasks.sampling import Moves
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import watching
-from motionloom.tasks.worded import ATTEMPTS, attempt_seed, replacement_line
 
+ATTEMPTS = 4
+"""Samples of which the best is kept, where words are plain without numbers."""
 LONGEST = 120.0
 """Seconds of sampled blocks up to which requests have them held against their words."""
+
+
+def attempt_seed(seed: int, number: int) -> int:
+    """The seed of an attempt: the motion's own, then others that depend on it alone."""
+    return seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
+
+
+def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
+    """A sentence with texts that are generated as others; empty where none is."""
+    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
+    both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
+    return both_ways and f"{both_ways}, which these weights know better"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +66,7 @@ def reattempt(
     blocks: Iterable[int],
     *,
     start: Motion | None = None,
+    attempts: int = ATTEMPTS,
     progress: Moves | None = None,
 ) -> Reattempted:
     """The motion of a timeline with those of its blocks sampled again that do not show what their words say plainly.
@@ -62,6 +78,7 @@ def reattempt(
         motion: what was sampled from it: the 22-joint person at 20 frames per second.
         blocks: numbers of those that may be sampled again.
         start: what the motion goes on from.
+        attempts: samples of a block at most, with that of the motion.
         progress: called with the number of row moves, which are further ones.
     """
     looked = [i for i in range(len(timed.segments)) if _is_free(timed, i, start)]
@@ -72,13 +89,13 @@ def reattempt(
     def unseen(of: Motion, near: Iterable[int]) -> dict[int, list[str]]:
         places = of.positions()
         cuts = {i: places[begins[i] : begins[i + 1]] for i in near if i in looked}
-        return {i: missing(plain[i], own, of.fps) for i, own in cuts.items()}
+        return {i: missing(timed.segments[i].text, own, of.fps) for i, own in cuts.items()}
 
     best, kept = unseen(motion, looked), {}
     with watching(lambda denoised: None):  # what is watched is the first attempt
         for i in (i for i in looked if i in sampled):
             near = (i - 1, i, i + 1)
-            for number in range(1, ATTEMPTS):
+            for number in range(1, attempts):
                 if not best[i]:
                     break
                 again = _sample_again(timed, motion, i, plain[i], number, start, progress)

@@ -307,7 +307,7 @@ def _run_rows(plans: Sequence[Plan], models: Models, progress: Progress) -> Iter
         )
     elif first.timeline is not None or not first.values.as_one:
         timelines = [plans[i].timeline or single_segment(plans[i].prompt, plans[i].seconds) for i, _ in rows]
-        attempts = 1 if first.values.as_one or first.values.literal else worded.ATTEMPTS
+        attempts = 1 if first.values.as_one or first.values.literal else reattempts.ATTEMPTS
         how |= {"attempts": attempts, "foot_lock": first.values.foot_lock}
         results = map(_worded_result, worded.generate_timelines(prior, timelines, **how))
     else:

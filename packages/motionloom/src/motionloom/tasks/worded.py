@@ -9,7 +9,7 @@ with the least missing. A head that nods, is shaken or looks aside is turned in 
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby, pairwise
@@ -17,7 +17,6 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from motionloom.diffusion.sampling import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as goal_timeline
@@ -30,11 +29,13 @@ from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
-from motionloom.requests.sampling import LARGEST_SEED, SOLVER, Sampling, Settings
+from motionloom.requests.sampling import SOLVER, Sampling, Settings
 from motionloom.tasks.adapting import lines_by_text, remarks_on_words
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
+from motionloom.tasks.reattempts import ATTEMPTS, attempt_seed, reattempt, replacement_line
+from motionloom.tasks.redraw import Timed
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support
@@ -42,8 +43,8 @@ from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.tasks.watching import watching
 from motionloom.weights.prior import Prior
 
-TRIES, ATTEMPTS = 6, 4
-"""Motions of which the best is kept: where numbers are counted, and where the words are plain without numbers."""
+TRIES = 6
+"""Motions of which the best is kept where numbers are counted; `ATTEMPTS` where the words are plain without numbers."""
 _TOGETHER = 256
 """Motions that are sampled and looked at together."""
 STILL = 1.5
@@ -92,12 +93,20 @@ class Worded:
     def missing(self) -> list[str]:
         """What else the words say plainly and the motion does not show: "a turn to the left"."""
         places, begins = self.motion.positions(), self.timeline.begins
-        counted = {i for one in self.timeline.readings for i in range(one.first, one.end)}
-        free = [i for i in range(len(begins) - 1) if i not in counted]
-        texts = [segment.text for segment in self.timeline.plainer.segments]
-        if len(set(texts)) == 1 and len(free) == len(texts):
-            return missing(texts[0], places, self.motion.fps)
-        return [name for i in free for name in missing(texts[i], places[begins[i] : begins[i + 1]], self.motion.fps)]
+        texts = [segment.text for segment in (self.said or self.timeline).segments]
+        measured = {i for one in self.timeline.readings for i in range(one.first, one.end)}
+        free = [(i, i + 1) for i in range(len(texts)) if i not in measured]
+        if len(set(texts)) == 1 and len(free) == len(texts):  # flights of stairs
+            free = [(0, len(texts))]
+        names = [
+            name for i, end in free for name in missing(texts[i], places[begins[i] : begins[end]], self.motion.fps)
+        ]
+        for reading in self.timeline.readings:
+            if reading.amount.of:  # how often is measured; where and with what is not
+                own = places[begins[reading.first] : begins[reading.end]]
+                found = missing(texts[reading.first], own, self.motion.fps)
+                names += [name for name in found if not name.endswith(reading.amount.of)]
+        return names
 
     @property
     def remarks(self) -> list[str]:
@@ -147,13 +156,6 @@ class Worded:
         ):
             return ""
         return f"it ends standing still, from {begin:.1f} s on: what these weights do not know often does"
-
-
-def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
-    """A sentence with texts that are generated as others; empty where none is."""
-    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
-    both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
-    return both_ways and f"{both_ways}, which these weights know better"
 
 
 def read(
@@ -343,18 +345,14 @@ def _once_at_its_end(progress: Progress | None) -> tuple[Progress | None, Progre
     return first, lambda done, of: progress(calls, calls)
 
 
-def attempt_seed(seed: int, number: int) -> int:
-    """The seed of an attempt: the motion's own, then others that depend on it alone."""
-    return seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
-
-
 def _best_try(
     prior: Prior, timeline: Timeline, *, sampling: Sampling, seed: int, attempts: int, foot_lock: bool
 ) -> Worded:
     """The sample that misses the least of what can be counted, then of what else the words say plainly."""
     least, shares, best = (np.inf, 0), [1.0] * len(timeline.readings), None
     counts = any(reading.amount.kind in ("count", "steps") for reading in timeline.readings)
-    for number in range(TRIES if counts else attempts):
+    in_blocks = attempts > 1 and len({segment.text for segment in timeline.segments}) > 1
+    for number in range(TRIES if counts else 1 if in_blocks else attempts):
         said = _scaled(timeline, shares)
         now = said.plainer if number else said
         own = replace(sampling, seed=attempt_seed(seed, number), first=0)
@@ -368,14 +366,31 @@ def _best_try(
         off = sum(abs(one.asked - one.measured) for one in counted), len(candidate.missing)
         if best is None or off < least:
             best, least = candidate, off
-        if not off[0] and (not off[1] or number + 1 >= attempts):
+        if not off[0] and (in_blocks or not off[1] or number + 1 >= attempts):
             break
         shares = [
             share * float(np.clip((one.asked / max(one.measured, 0.5)) ** 0.5, 0.75, 1.35))
             for share, one in zip(shares, candidate.amounts, strict=True)
         ]
     assert best is not None
-    return best
+    how = Timed(prior, best.timeline.segments, None, replace(sampling, seed=seed, first=0), foot_lock)
+    if in_blocks and best.missing:
+        best = _blocks_again(best, how)
+    several = len(timeline.segments) > 1
+    return replace(best, motion=add_support(best.motion)) if several and foot_lock else best
+
+
+def _blocks_again(one: Worded, timed: Timed) -> Worded:
+    """The motion with those of its actions sampled again that do not show what their words say (`reattempts`)."""
+    timeline = one.timeline
+    counted = {i for reading in timeline.readings for i in range(reading.first, reading.end)}
+    blocks = [i for i in range(len(timeline.segments)) if i not in counted]
+    found = reattempt(timed, one.motion, blocks, attempts=one.attempts)
+    texts = [found.again.get(i, segment.text) for i, segment in enumerate(timeline.segments)]
+    segments = tuple(replace(segment, text=text) for segment, text in zip(timeline.segments, texts, strict=True))
+    now = replace(timeline, segments=segments)
+    amounts = _measure_amounts(now, found.motion)
+    return replace(one, motion=found.motion, timeline=now, amounts=amounts, said=one.said or timeline)
 
 
 def _scaled(timeline: Timeline, shares: Sequence[float]) -> Timeline:
@@ -388,7 +403,7 @@ def _scaled(timeline: Timeline, shares: Sequence[float]) -> Timeline:
         at = reading.end
         own = timeline.segments[reading.first : reading.end]
         if reading.amount.kind in ("count", "steps"):
-            together = replace(own[0], seconds=sum(one.seconds for one in own))
+            together = replace(own[0], seconds=sum(one.seconds for one in own), goal=None)
             own = goal_timeline.with_amount(together, reading.amount, min(max(share, 0.5), 2.0))
             own = goal_timeline.in_seconds(own, together.seconds) if reading.fixed else own
         readings.append(replace(reading, first=len(segments), end=len(segments) + len(own)))
@@ -399,8 +414,7 @@ def _scaled(timeline: Timeline, shares: Sequence[float]) -> Timeline:
 def _sample_timeline(prior: Prior, timeline: Timeline, sampling: Sampling, foot_lock: bool) -> Motion:
     segment, *more = timeline.segments
     if more:
-        motion = concatenate(*compose(prior, timeline.segments, foot_lock=foot_lock, sampling=sampling))
-        return add_support(motion) if foot_lock else motion
+        return concatenate(*compose(prior, timeline.segments, foot_lock=foot_lock, sampling=sampling))
     if segment.goal is not None:
         (controlled,) = control(prior, segment.text, segment.goal, foot_lock=foot_lock, sampling=sampling)
         return controlled.motion
