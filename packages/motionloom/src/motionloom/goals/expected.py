@@ -72,7 +72,7 @@ _IN_PLACE = (
 _NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
 _TUMBLES = (
     r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
-    r"|rolls? (?:over|forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
+    r"|rolls? (?:forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
 )
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
 _FALLS = r"\b(?:falls?|falling|fell|collapses?|collapsing)\b(?! (?:asleep|behind|back|in love|silent)\b)"
@@ -178,6 +178,8 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         yield f"a turn to the {side}", lambda p, fps: sign * turn(p) > _TURNS
     elif turns and phrase.has(r"\b(?:around|round|about|180|other (?:way|direction)|opposite)\b"):
         yield "a half turn", lambda p, fps: _TURNS_ROUND[0] < abs(turn(p)) < _TURNS_ROUND[1]
+    elif turns and phrase.has(r"\baway\b"):
+        yield "a turn", lambda p, fps: abs(turn(p)) > 2 * _TURNS
     if phrase.has(_IN_PLACE):
         yield "staying in place", lambda p, fps: float(np.hypot(*_from_start(p).max(axis=0))) < 2 * _GOES
     elif phrase.has(r"\b(?:walks? back|walking back|comes? back|returns?)\b") and not phrase.has(_BACKWARDS):
