@@ -60,6 +60,34 @@ def test_repetitions_take_the_seconds_that_were_said(
     assert [i for i, one in enumerate(timeline.segments) if one.text.endswith(" stands still")] == rests
 
 
+@pytest.mark.parametrize("seconds", [None, 4.0])
+def test_a_length_changes_how_long_a_way_takes_and_not_where_it_leads(seconds: float | None) -> None:
+    (segment,) = timeline_of("a person takes three steps back", seconds, amounts=True).segments
+    assert segment.goal is not None
+    assert len(segment.goal) == round(20 * segment.seconds)
+    assert segment.goal.positions[-1, 0, 2] == pytest.approx(-1.2)
+
+
+@pytest.mark.parametrize(
+    ("text", "in_place"),
+    [
+        ("a person jumps twice", True),
+        ("a person jumps on the spot three times", True),
+        ("a person jumps forward twice", False),
+        ("a person jumps over the fence twice", False),
+        ("a person bows twice", False),
+    ],
+)
+def test_counted_jumps_stay_in_place_unless_they_lead_somewhere(text: str, in_place: bool) -> None:
+    for seconds in (None, 3.0, 7.0):
+        strokes = [one for one in timeline_of(text, seconds, amounts=True).segments if "stands" not in one.text]
+        for one in strokes:
+            assert (one.goal is not None) == in_place
+            if one.goal is not None:
+                assert one.goal.mask[:, 0, [0, 2]].all()
+                assert not one.goal.positions.any()
+
+
 def test_every_key_arrives_where_it_belongs(read, tmp_path):
     io.save(Motion(SMPL22, 20.0, np.zeros((3, 3)), np.tile(IDENTITY, (3, 22, 1))), tmp_path / "clip.bvh")
     timeline = read(

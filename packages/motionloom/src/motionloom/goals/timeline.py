@@ -219,6 +219,8 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
 def in_seconds(segments: Sequence[Segment], seconds: float) -> tuple[Segment, ...]:
     """Segments in so many seconds: shorter ones, or the last one longer, or somebody who then stands still."""
     left = seconds - sum(one.seconds for one in segments)
+    if not round(left * FPS):
+        return tuple(segments)
     if left < 0:
         each = seconds / len(segments)
         return tuple(_lasting(one, each) for one in segments)
