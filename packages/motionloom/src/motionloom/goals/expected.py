@@ -75,7 +75,10 @@ _TUMBLES = (
     r"|rolls? (?:forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
 )
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
-_FALLS = r"\b(?:falls?|falling|fell|collapses?|collapsing)\b(?! (?:asleep|behind|back|in love|silent)\b)"
+_FALLS = (
+    r"(?<!\bwithout )(?<!\bnot )(?<!\balmost )(?<!\bnearly )(?<!n't )\b(?:falls?|falling|fell|collapses?|collapsing)\b"
+    r"(?! (?:asleep|behind|back|in love|silent)\b)"
+)
 _ARMS_OUT = r"\barms (?:\w+ )?(?:out\b|spread|outstretched|stretched)(?! (?:of|up|over|above))"
 _LEVEL = r"\b(?:shoulders?|chest|t-?pose|sides?|sideways|out|front)\b"
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"

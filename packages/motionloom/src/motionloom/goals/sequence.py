@@ -332,7 +332,7 @@ _RISES_AGAIN = re.compile(r"(?:stand|get|push|rise)s? (?:right |straight )?(?:ba
 """The end of a squat, which is no squat without."""
 _STAYS = re.compile(
     r"(?:stay|remain)s? (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
-    r"|holds? (?:it(?! \w+ (?:his|her|their|the) )|that|this|still|(?:the|this|that) po(?:se|sition))(?= *$| for )",
+    r"|holds?(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?= *$| for )",
     re.IGNORECASE,
 )
 _TOGETHER = (
@@ -361,6 +361,10 @@ _OBJECT = re.compile(
     re.IGNORECASE,
 )
 """A thing that something is done with: what "it" and "them" mean behind it."""
+_IT = re.compile(
+    r"^((?:\w+ly )?\w+(?: (?:from|at|with|on|over|into|to|through|under|for))?) (?:it|them)\b"
+    r"(?: back(?= (?:down|on|in|to)\b))?"
+)
 _NO_OBJECT = re.compile(r"(?:the|his|her|their|an?) (?:floor|ground|left|right|front|back|side|step)$", re.IGNORECASE)
 _STAIRS = re.compile(r"\bstairs?\b|\bstaircase\b", re.IGNORECASE)
 _TURNED = re.compile(r"\bturn(?:s|ed)? (?:around|round|about|back)\b", re.IGNORECASE)
@@ -427,7 +431,7 @@ def _rephrased(parts: Sequence[str], rest: str) -> str:
     named = [[one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] for part in reversed(parts)]
     things = next(filter(None, named), [""])
     thing = re.sub(r"^(?:an?|some|another|one)\b", "the", things[0], flags=re.IGNORECASE)
-    return re.sub(r"^((?:\w+ly )?\w+) (?:it|them)\b", rf"\1 {thing}", rest, count=1) if thing else rest
+    return _IT.sub(rf"\1 {thing}", rest, count=1) if thing else rest
 
 
 def _form(base: str, mood: str) -> str:
