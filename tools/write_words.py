@@ -20,6 +20,8 @@ PATTERNS = {
     "many": amounts._MANY,
     "ages": amounts._AGES,
     "body": amounts._BODY,
+    "held": amounts._HELD,
+    "travels": amounts._TRAVELS,
     "else": amounts._ELSE,
     "number_words": numerals._WORDS,
     "and_a_half": numerals._HALF,

@@ -65,7 +65,9 @@ export function partsOf(text: string, seconds: number, amount: Amount | null, fp
   const [stroke, single] = [tables.strokes[amount.of!], once(text)];
   if (stroke < CHAINED) return [{ ...whole, text: single, seconds: Math.max(1, rounded(seconds * fps)) / fps }];
   const each = Math.max(1, rounded(Math.min(stroke, seconds / amount.size) * fps)) / fps;
-  const part = { ...whole, text: single, seconds: each, transition: Math.min(TRANSITION, each / 2) };
+  const places = Array.from({ length: rounded(each * fps) }, (): Place => [0, 0]);
+  const way = amount.inPlace ? { places, facing: null } : null;
+  const part = { text: single, seconds: each, transition: Math.min(TRANSITION, each / 2), way };
   return Array.from({ length: amount.size }, () => part);
 }
 

@@ -21,6 +21,8 @@ export interface Amount {
   /** Whether an arc is walked backwards. */
   readonly backward: boolean;
   readonly of: Counted | null;
+  /** Whether repetitions stay in one place. */
+  readonly inPlace: boolean;
 }
 
 /** Metres: of a circle that is walked where its size is not said. */
@@ -128,7 +130,7 @@ const has = (some: ReadonlySet<string>, others: ReadonlySet<string>): boolean =>
   [...some].some((one) => others.has(one));
 
 function amount(kind: Amount["kind"], size: number, direction: Direction, more: Partial<Amount> = {}): Amount {
-  return { kind, size, direction, metres: 0, speed: 0, backward: false, of: null, ...more };
+  return { kind, size, direction, metres: 0, speed: 0, backward: false, of: null, inPlace: false, ...more };
 }
 
 const sideways = (side: string): Direction => (side === "left" ? "left" : "right");
@@ -146,12 +148,14 @@ function repetitions(phrase: string): Amount | null {
   if (kinds.includes("jumping jacks")) kinds = kinds.filter((what) => what !== "jumps");
   const size = many[0] ? Number(many[0][1]) : often(times[0]![1]!, times[0]![2]);
   if (kinds.length !== 1 || !Number.isInteger(size) || size < 1 || size > MOST_TIMES) return null;
-  const side = sideOf(phrase);
-  return amount("count", size, side ? sideways(side) : "forward", { of: kinds[0]! });
+  const [side, of] = [sideOf(phrase), kinds[0]!];
+  const inPlace = of === "jumps" && !first("travels", phrase);
+  return amount("count", size, side ? sideways(side) : "forward", { of, inPlace });
 }
 
 function turn(phrase: string, verbs: ReadonlySet<string>): Amount | null {
-  if (!has(verbs, TURNING) || first("body", phrase) || has(verbs, listed("throw look"))) return null;
+  const still = phrase.replace(PATTERNS.held, "");
+  if (!has(verbs, TURNING) || first("body", still) || has(verbs, listed("throw look"))) return null;
   const [found, part] = [all("degrees", phrase), first("part_of_turn", phrase)];
   const [whole, times] = [first("turns_often", phrase), oftenIn(phrase)[0]];
   if (found.length > 1 || Number(found.length > 0) + Number(!!part) + Number(!!(whole ?? times)) !== 1) return null;

@@ -39,7 +39,7 @@ def row(text: str) -> dict[str, object]:
         for one in with_amount(Segment(text, seconds), amount):
             goal = one.goal
             places = [] if goal is None or not goal.mask.any() else goal.positions[:, 0, [0, 2]].tolist()
-            facing = [] if goal is None else goal.facing.tolist()
+            facing = [] if goal is None or not goal.facing_mask.any() else goal.facing.tolist()
             parts.append(
                 {
                     "text": one.text,
