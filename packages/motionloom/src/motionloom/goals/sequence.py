@@ -118,7 +118,7 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
     for part in parts:
         rest = part.text.removeprefix(subject_of(part.text)).strip()
         before = _first_verb(result[-1].text) if result else "walk"
-        if (_LASTS.match(rest) and before in _POSTURES) or (_STAYS.match(rest) and before not in _WALKS):
+        if (_LASTS.match(rest) and before in _POSTURES) or (_STAYS.match(_in_base(rest)) and before not in _WALKS):
             both = result[-1].seconds + part.seconds
             result[-1] = Part(result[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
         else:
@@ -138,7 +138,7 @@ def _keep_postures(parts: Sequence[str]) -> list[str]:
         named = subject_of(part)
         rest = part.removeprefix(named).strip()
         mood, verb = mood_of(rest), _first_verb(part)
-        if _STAYS.match(rest):
+        if _STAYS.match(_in_base(rest)):
             pass
         elif verb in _POSTURES or (verb == "take" and _SEATED.search(rest)):
             posture = _POSTURES.get(verb, "sit")
@@ -249,7 +249,7 @@ def _split_list(clause: str) -> list[str]:
             joins.append(join)
         else:
             items[-1] += join + piece
-    if len(items) < 2 or (len(items) == 2 and _COMES_UP.match(items[1]) and read_amount(clause)):
+    if len(items) < 2 or (len(items) == 2 and _COMES_UP.match(_in_base(items[1])) and read_amount(clause)):
         return [clause]
     if len(items) > 2:
         return items
@@ -321,18 +321,18 @@ _SIDE_ALONE = re.compile(
 )
 _THING_ALONE = re.compile(r"(?:a|an|one|another|two|three) (?:[a-z-]+ ){0,2}[a-z-]+", re.IGNORECASE)
 _ENDS = re.compile(
-    r"straighten(?:s|ed|ing)?(?: (?:back )?up)?(?: again)?"
+    r"straighten(?: (?:back )?up)?(?: again)?"
     r"|(?=.*\b(?:back|again|right|straight)\b)"
-    r"(?:come|go|pop)(?:es|s)? (?:right |straight |quickly |slowly )?(?:back )?up(?: again)?",
+    r"(?:come|go|pop) (?:right |straight |quickly |slowly )?(?:back )?up(?: again)?",
     re.IGNORECASE,
 )
 """The end of bowing, bending, ducking."""
 _SQUATS = re.compile(r"\b(?:squat|lunge)", re.IGNORECASE)
-_RISES_AGAIN = re.compile(r"(?:stand|get|push|rise)s? (?:right |straight )?(?:back )?up(?: again)?", re.IGNORECASE)
+_RISES_AGAIN = re.compile(r"(?:stand|get|push|rise) (?:right |straight )?(?:back )?up(?: again)?", re.IGNORECASE)
 """The end of a squat, which is no squat without."""
 _STAYS = re.compile(
-    r"(?:stay|remain)s? (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
-    r"|holds?(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?= *$| for )",
+    r"(?:stay|remain) (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
+    r"|hold(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?= *$| for )",
     re.IGNORECASE,
 )
 _TOGETHER = (
@@ -346,15 +346,13 @@ _TOGETHER = (
 _WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
 """Who stays somewhere after these stands still, which is an action of its own."""
 _UP_AGAIN = re.compile(
-    r"(?:get|come|go|rise)(?:es|s)? (?:right |straight )?(?:back )?"
+    r"(?:get|come|go|rise) (?:right |straight )?(?:back )?"
     r"(?:up|(?:on)?to (?:his|her|their|your) feet|on (?:his|her|their|your) feet)(?: again)?",
     re.IGNORECASE,
 )
-_COMES_UP = re.compile(
-    r"(?:stand|come|get|go|rise|straighten)(?:es|s)? (?:right |straight )?(?:back )?up\b", re.IGNORECASE
-)
+_COMES_UP = re.compile(r"(?:stand|come|get|go|rise|straighten) (?:right |straight )?(?:back )?up\b", re.IGNORECASE)
 """What only ends each of several repetitions: "squats down and comes back up three times"."""
-_BACK_AGAIN = re.compile(r"(walk|run|jog|come|go)(?:es|s)? back\b.*|returns?\b.*", re.IGNORECASE)
+_BACK_AGAIN = re.compile(r"(walk|run|jog|come|go) back\b.*|return\b.*", re.IGNORECASE)
 _OBJECT = re.compile(
     r"(?<=\w )((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+)"
     r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again)\b)",
@@ -368,7 +366,7 @@ _IT = re.compile(
 _NO_OBJECT = re.compile(r"(?:the|his|her|their|an?) (?:floor|ground|left|right|front|back|side|step)$", re.IGNORECASE)
 _STAIRS = re.compile(r"\bstairs?\b|\bstaircase\b", re.IGNORECASE)
 _TURNED = re.compile(r"\bturn(?:s|ed)? (?:around|round|about|back)\b", re.IGNORECASE)
-_SEATED = re.compile(r"\b(?:sits?|seat)\b", re.IGNORECASE)
+_SEATED = re.compile(r"\b(?:sits?|sat|seat)\b", re.IGNORECASE)
 _ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
 
 
@@ -394,6 +392,7 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
 
 def _only_ends(before: str, rest: str) -> bool:
     """Whether something only ends, or keeps, what was done before."""
+    rest = _in_base(rest)
     if _ENDS.fullmatch(rest):
         return not _SEATED.search(before)
     if _SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
@@ -417,21 +416,26 @@ def _with_repeated_words(before: str, part: str) -> str:
 
 def _rephrased(parts: Sequence[str], rest: str) -> str:
     """The action in words that make sense without the parts before."""
-    mood, before = mood_of(rest) or "third", parts[-1]
-    back = _BACK_AGAIN.fullmatch(rest)
-    if back and (on := re.fullmatch(r"\w+ back (up|down)", rest)) and any(map(_STAIRS.search, parts)):
+    mood, before, plain = mood_of(rest) or "third", parts[-1], _in_base(rest)
+    back = _BACK_AGAIN.fullmatch(plain)
+    if back and (on := re.fullmatch(r"\w+ back (up|down)", plain)) and any(map(_STAIRS.search, parts)):
         return f"{_form('walk', mood)} {on[1]} the stairs"
     if back and _TURNED.search(before):
         moves = (back[1] or "walk").lower()
         return f"{_form('walk' if moves in ('come', 'go') else moves, mood)} forward"
-    if (_UP_AGAIN.fullmatch(rest) or _ENDS.fullmatch(rest)) and _SEATED.search(before):
+    if (_UP_AGAIN.fullmatch(plain) or _ENDS.fullmatch(plain)) and _SEATED.search(before):
         return f"{_form('stand', mood)} up{' from the floor' if _ON_THE_FLOOR.search(before) else ' again'}"
-    if _STAYS.match(rest):
+    if _STAYS.match(plain):
         return rest
     named = [[one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] for part in reversed(parts)]
     things = next(filter(None, named), [""])
     thing = re.sub(r"^(?:an?|some|another|one)\b", "the", things[0], flags=re.IGNORECASE)
     return _IT.sub(rf"\1 {thing}", rest, count=1) if thing else rest
+
+
+def _in_base(rest: str) -> str:
+    """What is done with its verb as in "to walk": "walked back again" as "walk back again"."""
+    return finite(rest, "base", of=mood_of(rest) or "third")
 
 
 def _form(base: str, mood: str) -> str:
