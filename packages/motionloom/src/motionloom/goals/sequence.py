@@ -354,7 +354,8 @@ _COMES_UP = re.compile(r"(?:stand|come|get|go|rise|straighten) (?:right |straigh
 """What only ends each of several repetitions: "squats down and comes back up three times"."""
 _BACK_AGAIN = re.compile(r"(walk|run|jog|come|go) back\b.*|return\b.*", re.IGNORECASE)
 _OBJECT = re.compile(
-    r"(?<=\w )((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+)"
+    r"(?<!with )(?<!\bin )(?<!\bon )(?<!of )(?<!to )(?<!from )(?<!at )(?<!over )(?<!by )(?<=\w )"
+    r"((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+)"
     r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again)\b)",
     re.IGNORECASE,
 )
