@@ -176,13 +176,17 @@ def body_start(skeleton: Skeleton, places: Array) -> int:
 def _limbs(
     skeleton: Skeleton, places: Array, bones: tuple[tuple[int, int], ...], sides: tuple[int, ...]
 ) -> list[tuple[int, int, bool]]:
-    """Arms and legs as (shoulder or hip, elbow or knee, is an arm): each begins with its two longest bones in a row."""
+    """Arms and legs as (shoulder or hip, elbow or knee, is an arm): each begins with its two longest bones in a row.
+
+    Arms leave the trunk after more bones than legs do, whatever somebody does. Where that does not part two from two,
+    those that do not reach down, most of the time, are arms.
+    """
     lengths = _lengths(skeleton, places)
     height = np.median(places[..., 1], axis=0)
     depth = [0] * len(skeleton)
     for joint, parent in enumerate(skeleton.parents[1:], start=1):
         depth[joint] = depth[parent] + 1
-    limbs: list[tuple[int, int, bool]] = []
+    limbs: list[tuple[int, int, int, bool]] = []
     for start in (c for p, c in bones if sides[c] != 0 and sides[p] == 0):
         inside = skeleton.below(start)
         pairs = [(skeleton.parents[j], j) for j in inside[1:] if skeleton.children(j)]
@@ -190,9 +194,12 @@ def _limbs(
             continue
         best = max(pairs, key=lambda pair: lengths[pair[1]] + max(lengths[c] for c in skeleton.children(pair[1])))
         tip = max(inside, key=depth.__getitem__)
-        rest_drop = height[tip] - height[start]
-        limbs.append((best[0], best[1], bool(rest_drop > -0.35 * np.ptp(height))))
-    return limbs
+        drop = height[start] - height[tip]
+        limbs.append((*best, depth[start], bool(drop < 0.35 * np.ptp(height))))
+    first = min((leaves for _, _, leaves, _ in limbs), default=0)
+    early = sum(leaves == first for _, _, leaves, _ in limbs)
+    by_tree = 2 <= early <= len(limbs) - 2
+    return [(start, joint, leaves > first if by_tree else high) for start, joint, leaves, high in limbs]
 
 
 def _chest(skeleton: Skeleton, arms: tuple[int, ...], centre: int) -> tuple[int, ...]:
