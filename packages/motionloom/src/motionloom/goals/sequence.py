@@ -387,7 +387,7 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
         if _only_ends(before, rest):
             result[-1] = f"{before} and {rest}"
         else:
-            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(result, rest)}".strip())
+            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(result[-MOST_PARTS:], rest)}".strip())
     return result
 
 

@@ -373,9 +373,9 @@ def _best_try(
             for share, one in zip(shares, candidate.amounts, strict=True)
         ]
     assert best is not None
-    how = Timed(prior, best.timeline.segments, None, replace(sampling, seed=seed, first=0), foot_lock)
     if in_blocks and best.missing:
-        best = _blocks_again(best, how)
+        own = replace(sampling, seed=seed, first=0)
+        best = _blocks_again(best, Timed(prior, best.timeline.segments, None, own, foot_lock))
     several = len(timeline.segments) > 1
     return replace(best, motion=add_support(best.motion)) if several and foot_lock else best
 
