@@ -48,6 +48,10 @@ from motionloom.goals.verbs import MOODS, PLAINER, base_of, in_plainer_words, ki
         ("he is limping, his right leg hurts", "he is walking slowly"),
         ("she jogs on the spot, happily", "she hops from one foot to the other, happily"),
         ("walks along a tightrope", "walks along a line"),
+        ("she walks on a narrow beam", "she walks along a line"),
+        ("pushing a heavy cart forward with both hands", "walking forward pushing a heavy cart with both hands"),
+        ("he pushes the door open", "he pushes the door open"),
+        ("she paced back and forth", "she walked back and forth"),
         ("someone slowly lowers both arms again", "someone slowly stands"),
         # nouns, and what is common already
         ("a guard on patrol walks", "a guard on patrol walks"),

@@ -71,6 +71,7 @@ _LASTS = re.compile(
 """Predicates of somebody who goes on being as they are."""
 _POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch": "crouch", "squat": "crouch"}
 """Verbs of who ends up low, and of who is: the weights know nobody who stays in a squat."""
+_DOWN = re.compile(r"take a seat\b.*|(?:drop|go|get|sink|fall|take) (?:\w+ ){0,3}knees?\b.*", re.IGNORECASE)
 _WHERE_LOW = re.compile(r"\bon (?:the|his|her|their|its) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE)
 
 
@@ -140,11 +141,11 @@ def _keep_postures(parts: Sequence[str]) -> list[str]:
         mood, verb = mood_of(rest), _first_verb(part)
         if _STAYS.match(_in_base(rest)):
             pass
-        elif verb in _POSTURES or (verb == "take" and _SEATED.search(rest)):
-            posture = _POSTURES.get(verb, "sit")
+        elif verb in _POSTURES or _DOWN.fullmatch(_in_base(rest)):
+            posture = _POSTURES.get(verb, "kneel" if "knee" in rest else "sit")
             where = _WHERE_LOW.search(rest)
             place = f" {where[0]}" if where and posture in ("sit", "lie") else ""
-        elif posture and kind_of(part, mood) == "gesture":
+        elif posture and (kind_of(part, mood) == "gesture" or verb == "lean"):
             part = f"{named} {_form(posture, mood)}{place} and {rest}".strip()
         elif not _WAITS.match(rest):
             posture = ""
@@ -387,7 +388,9 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
         if _only_ends(before, rest):
             result[-1] = f"{before} and {rest}"
         else:
-            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(result[-MOST_PARTS:], rest)}".strip())
+            result.append(
+                _with_repeated_words(before, part) or f"{named} {_rephrased(result[-MOST_PARTS:], rest)}".strip()
+            )
     return result
 
 
