@@ -22,7 +22,7 @@ MAX_FUNCTION_LINES = 75
 MAX_FILE_LINES = 480
 BUDGETS = {
     "lab/suites": 8_556,
-    "tasks": 6_816,
+    "tasks": 6_817,
     "io": 6_161,
     "goals": 5_489,
     "server": 5_359,

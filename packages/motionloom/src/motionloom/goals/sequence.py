@@ -71,7 +71,7 @@ _LASTS = re.compile(
 """Predicates of somebody who goes on being as they are."""
 _POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch": "crouch", "squat": "crouch"}
 """Verbs of who ends up low, and of who is: the weights know nobody who stays in a squat."""
-_DOWN = re.compile(r"take a seat\b.*|(?:drop|go|get|sink|fall|take) (?:\w+ ){0,3}knees?\b.*", re.IGNORECASE)
+_DOWN = re.compile(r"take a seat\b.*|(?:drop|go|get|sink|fall|take) (?:(?!up |off )\w+ ){0,3}knees?\b.*", re.IGNORECASE)
 _WHERE_LOW = re.compile(r"\bon (?:the|his|her|their|its) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE)
 
 

@@ -1,6 +1,6 @@
 """Blocks of a timeline that do not show what their words say plainly are sampled again, between frames that stay.
 
-What `motionloom.tasks.worded` does with sentences of one action. A block is held against its words
+Blocks of timelines, and the actions of one sentence (`motionloom.tasks.worded`). A block is held against its words
 (`motionloom.goals.expected`). Where something is missing it is sampled from up to three other seeds, with a common verb
 for each rare one, as if it had been changed (`motionloom.tasks.redraw`), and the sample with the least missing stays.
 """

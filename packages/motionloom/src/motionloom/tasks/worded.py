@@ -5,7 +5,8 @@ met; steps and repetitions are counted in the motion, and where the number diffe
 seed, with a shorter or longer way or stroke, `TRIES` times at most. What else the words say plainly
 (`motionloom.goals.expected`: a turn to the left, a wave, a kick of the right leg) is looked for in `ATTEMPTS` motions
 at most, of which all but the first have a common verb for each rare one ("walks" for "trudges"). The result is the one
-with the least missing. A head that nods, is shaken or looks aside is turned in it (`motionloom.goals.heads`).
+with the least missing; of several actions only those that miss something are sampled again (`reattempts`). A head that
+nods, is shaken or looks aside is turned in it (`motionloom.goals.heads`).
 """
 
 import re
