@@ -38,6 +38,7 @@ const BASES = new Map(
 );
 const listed = (words: string): ReadonlySet<string> => new Set(words.split(" "));
 const [TURNING, GOING, STEPPING] = [listed(tables.turning), listed(tables.going), listed(tables.stepping)];
+const RUNNING = listed(tables.running);
 /** What may go with a way, and kinds of actions whose numbers are no ways: jumps, blows, dances. */
 const [BESIDE, IN_PLACE] = [listed("stop halt track return keep continue open place"), listed(tables.in_place)];
 const PACES: Readonly<Record<string, number>> = tables.paces;
@@ -77,6 +78,7 @@ export function readAmount(text: string): Amount | null {
   const times = repetitions(phrase);
   if (times) return times;
   if (!verbs.size || has(verbs, IN_PLACE)) return null;
+  phrase = phrase.replace(PATTERNS.steps_often, "$1 $3 steps$2");
   return turn(phrase, verbs) ?? arc(phrase, verbs) ?? steps(phrase, verbs) ?? way(phrase, verbs);
 }
 
@@ -175,8 +177,10 @@ function turn(phrase: string, verbs: ReadonlySet<string>): Amount | null {
 }
 
 function arc(phrase: string, verbs: ReadonlySet<string>): Amount | null {
-  const [part, side] = [first("arc", phrase), sideOf(phrase)];
-  if (!(part ?? first("circle", phrase)) || !side || !has(verbs, GOING) || first("body", phrase)) return null;
+  const [part, circle] = [first("arc", phrase), first("circle", phrase)];
+  const side =
+    sideOf(phrase) || (!part && circle && !has(verbs, RUNNING) && !/\b(?:left|right)\b/.test(phrase) ? "left" : "");
+  if (!(part ?? circle) || !side || !has(verbs, GOING) || first("body", phrase)) return null;
   const size = part?.[1] ?? "full";
   const degrees = size === "quarter" ? 90 : ["half", "semi", "0.5"].includes(size) ? 180 : 360;
   const metres = (RADIUS * degrees * Math.PI) / 180;

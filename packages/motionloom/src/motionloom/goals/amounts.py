@@ -103,17 +103,20 @@ _TURNS_ROUND = re.compile(
 """A half turn, unless another size is said."""
 _TURNS_OFTEN = re.compile(rf"\b{NUMBER} (?:full |complete |whole )?(?:turns|spins|pirouettes|rotations)\b")
 _ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi|full|complete|whole|0\.5)(?: of a)?[ -]?circles?\b")
-_CIRCLE = re.compile(r"\bin a circle\b")
+_CIRCLE = re.compile(r"\bin a (?:(?:(?:counter|anti)?[ -]?clockwise|small|tight|right|left|full) )*circle\b(?! of)")
 _STEPS = re.compile(
     rf"(?<!up )(?<!down )(?:\b{NUMBER}|(?:(?<=takes )|(?<=take )|(?<=taking )|(?<=took ))a(?:n)?(?: single)?)"
     r"(?: (small|tiny|short|baby|little|big|large|long|giant|huge|quick|slow|careful))?(?: (side|backward|forward))?"
     r"[ -]?(?:steps?|paces|strides?|sidesteps?)\b"
 )
+_STEPS_OFTEN = re.compile(
+    rf"\b((?:side)?step(?:s|ped|ping)?)\b(?! (?:up|down|on|over|onto)\b)((?: to)?(?: the)?(?: \w+)?) {NUMBER} times?\b"
+)
 _SECONDS = re.compile(
     r"(?<!\bafter )(?<!\bin )(?<!\bwithin )(?<!\bevery )(?<!\blast )(?<!\bfirst )(?<!\bof )"
     rf"(?<![\w.]){NUMBER}[ -]?(s|secs?|seconds?|mins?|minutes?)\b(?! (?:ago|later|before|after|lap|hand|time))"
 )
-_OFTEN = re.compile(rf"\b(once|twice|thrice|{NUMBER} times?)\b")
+_OFTEN = re.compile(rf"\b(once|twice|thrice|{NUMBER} (?:times?|reps|repetitions))\b")
 _OFTEN_OF_LIMBS = re.compile(
     r"\b(?:at|more than|once (?:upon|again|more)|all at|for) (?:once|1 time)\b|\bonce (?:upon|again|more)\b"
 )
@@ -128,8 +131,10 @@ _COUNTED: tuple[tuple[str, Counted], ...] = (
     (r"claps?|clapping|clapped", "claps"),
 )
 _MANY = re.compile(
-    rf"(?<!number )\b{NUMBER} (?:(?!and\b)[a-z]+ )?"
-    r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|bows?|claps?)\b"
+    rf"(?<!number )\b{NUMBER} (?:(?!(?:and|or|then|with|of|to|the|on|in|at|for|steps?|times?|seconds?|feet|hands)\b)"
+    r"[a-z-]+ ){0,2}"
+    r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|hooks?|uppercuts?"
+    r"|bows?|claps?)\b"
 )
 MOST_TIMES = 12
 _TRAVELS = re.compile(
@@ -181,6 +186,8 @@ _PACES = {
     "sidestep": 0.6,
     "skip": 1.6,
 }
+_RUNS = {"run", "jog", "sprint", "race"}
+"""Who does so leans far into a circle of `RADIUS`, which is run only where a side is said."""
 _WALKING = 1.1
 _GOING = {"walk", "stroll", "step", "go", "move", "pace", "stride", "wander", "back", *_PACES}
 _STEPPING = {"take", "make", "walk", "go", "move", "step", "march", "run", "sidestep", "stroll", "back"}
@@ -200,6 +207,7 @@ def read_amount(text: str, *, around: bool = False) -> Amount | None:
         return repetitions
     if not verbs or {kind_of_verb(verb, phrase) for verb in verbs} & {"jump", "fight", "dance"}:
         return None
+    phrase = _STEPS_OFTEN.sub(r"\1 \3 steps\2", phrase)
     return _turn(phrase, verbs, around) or _arc(phrase, verbs) or _steps(phrase, verbs) or _distance(phrase, verbs)
 
 
@@ -272,6 +280,8 @@ def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
 
 def _arc(phrase: str, verbs: list[str]) -> Amount | None:
     match, side = _ARC.search(phrase) or _CIRCLE.search(phrase), _side(phrase)
+    if match and match.re is _CIRCLE and not (set(verbs) & _RUNS or re.search(r"\b(?:left|right)\b", phrase)):
+        side = side or "left"
     if not match or not side or not set(verbs) & _GOING or _BODY.search(phrase):
         return None
     backward = _is_backward(phrase)

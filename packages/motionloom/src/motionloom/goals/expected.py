@@ -6,7 +6,7 @@ one is selected that shows the most (`motionloom.tasks.best`).
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,29 +52,45 @@ _LOW, _DOWN, _UP = 0.85, 0.4, 0.85
 sits or lies on it; over the feet of somebody who is up."""
 _UPRIGHT, _FLAT = np.radians(50), np.radians(60)
 """Inclination of the trunk below which somebody is upright, above which somebody lies."""
+_BENDS, _LEANS = np.radians(30), np.radians(8)
+"""Inclination of the trunk of who bends, and its sideways part of who leans to a side."""
 _FACES = np.radians(60)
 _KNEE = 0.15
 """Leg lengths that a knee which is pulled up may be below the hip."""
 _HANGS, _SPREAD = 0.15, 0.4
 """Metres that a hanging hand is over the pelvis at most, and that hands of arms that are out are away from it."""
+_CROSSED = 0.27
+"""Metres from a wrist to the other arm's elbow of who has crossed the arms."""
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
 _GAIT = (
-    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|pace|step"
+    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|step"
     r"|stumbl)"
-    r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b"
+    r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b|\bpac(?:es|ing|ed)\b|^pace\b"
 )
 _BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing) (?:up|away)|few steps back)\b|^back (?:up|away)\b"
 _IN_PLACE = (
     r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)"
     r"|(?:jump|hop|bounc)\w* up and down)\b"
 )
+_WAY_BACK = (
+    r"\b(?:walks? back|walking back|comes? back|returns?)\b(?! (?:and forth|up)\b)"
+    r"(?! to (?:an? |the |his |her |their )?(?:stand|upright|start|initial|original|neutral|normal))"
+)
 _NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
+_NO_THROW = (
+    r"\b(?:punch|kick|jab|hook|uppercut)"
+    r"|\bthrow\w* (?:up )?(?:his|her|their|its|both|the) (?:\w+ )?(?:arm|hand|head)s?\b"
+)
 _TUMBLES = (
     r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
     r"|rolls? (?:forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
 )
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
+_SIDE_BEND = (
+    r"\b(?:lean|bend|tilt)(?:s|ing|ed)? (?:\w+ )?(?:sideways )?(?:over )?to(?:wards?)? "
+    r"(?:the|his|her|their) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
+)
 _FALLS = (
     r"(?<!\bwithout )(?<!\bnot )(?<!\balmost )(?<!\bnearly )(?<!n't )\b(?:falls?|falling|fell|collapses?|collapsing)\b"
     r"(?! (?:asleep|behind|back|in love|silent)\b)"
@@ -185,7 +201,7 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         yield "a turn", lambda p, fps: abs(turn(p)) > 2 * _TURNS
     if phrase.has(_IN_PLACE):
         yield "staying in place", lambda p, fps: float(np.hypot(*_from_start(p).max(axis=0))) < 2 * _GOES
-    elif phrase.has(r"\b(?:walks? back|walking back|comes? back|returns?)\b") and not phrase.has(_BACKWARDS):
+    elif phrase.has(_WAY_BACK) and not phrase.has(_BACKWARDS):
         yield (
             "a way back",
             lambda p, fps: float(np.linalg.norm(p[-1, 0, [0, 2]] - p[0, 0, [0, 2]])) < travel(p, fps) / 2,
@@ -255,7 +271,7 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
     hands = {"": (0, 1), "left": (0,), "right": (1,)}[limb]
     rest = [hand for hand in (0, 1) if hand not in hands]
     if phrase.has(
-        r"\b(?:rais|lift|puts?|putting|holds?)\w* (?:up )?(?:\w+ ){0,3}(?:arm|hand)s?\b", r"rais|lift|\bup\b"
+        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:\w+ ){0,4}(?:arm|hand)s?\b", r"rais|lift|\bup\b"
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
         joint = "spine3" if phrase.has(_LEVEL) else "neck"
@@ -276,10 +292,16 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a raised foot", lambda p, fps: any(_lasts(foot_lifts(p)[:, hand] > _FOOT, 0.3, fps) for hand in hands)
     if phrase.has(r"(?<!\ba )(?<!\bthe )\bwav(?:e|es|ing)\b"):
         yield "a wave", lambda p, fps: max(wrist_swings(p, fps, amplitude=0.05)[hand] for hand in hands) >= 3
+    if phrase.has(r"\b(?:cross|fold)\w* (?:\w+ )?arms\b|\barms (?:crossed|folded)\b|\bcrossed arms\b"):
+        yield "crossed arms", lambda p, fps: _lasts(_hands_to_elbows(p) < _CROSSED, 0.3 * len(p) / fps, fps)
+    if phrase.has(r"\broll\w* (?:\w+ )?shoulders?\b"):
+        yield "standing", lambda p, fps: float(pelvis_height(p).min()) > _LOW
+    if phrase.has(r"\bhands? (?:to|on|over|against) (?:the|his|her|their) (?:forehead|head|face|eyes|ears?|brow)\b"):
+        yield "a hand at the head", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(r"\bhands? on (?:the |his |her |their )?(?:hips|waist)\b"):
         yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
-    if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(r"\b(?:punch|kick|jab|hook|uppercut)"):
-        yield "a throw", lambda p, fps: float(_wrist_speed(p, fps)[:, hands].max()) > 2.4
+    if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(_NO_THROW):
+        yield "a throw", lambda p, fps: _throws(_wrist_speed(p, fps).max(axis=0), hands)
     if phrase.has(r"\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(
@@ -293,6 +315,11 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
         yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
     if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
+    if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b"):
+        yield "a bend", lambda p, fps: _lasts(torso_inclination(p) > _BENDS, 0.2, fps)
+    if bent := re.search(_SIDE_BEND, phrase.text):
+        sign = 1 if bent[1] == "left" else -1
+        yield f"a lean to the {bent[1]}", lambda p, fps: _lasts(sign * _sideways(p) > _LEANS, 0.3, fps)
     if phrase.has(r"\bcrawl|\ball fours\b"):
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
     if phrase.has(_FALLS):
@@ -309,6 +336,12 @@ def _over(p: Array, joint: str) -> np.ndarray:
 
 def _upright(p: Array) -> np.ndarray:
     return torso_inclination(p) < _UPRIGHT
+
+
+def _sideways(p: Array) -> Array:
+    """(frames,) radians by which the line from the pelvis to the neck is inclined to the body's left."""
+    trunk = in_body(p)[:, J["neck"]] - in_body(p)[:, 0]
+    return np.arctan2(trunk[:, 0], trunk[:, 1])
 
 
 def _over_floor(p: Array) -> Array:
@@ -348,12 +381,23 @@ def _between_hands(p: Array) -> Array:
     return np.linalg.norm(p[:, WRISTS[0]] - p[:, WRISTS[1]], axis=-1)
 
 
+def _hands_to_elbows(p: Array) -> Array:
+    """(frames,) metres from a wrist to the other arm's elbow, of the two the longer."""
+    elbows = p[:, [J["right_elbow"], J["left_elbow"]]]
+    return np.linalg.norm(p[:, list(WRISTS)] - elbows, axis=-1).max(axis=1)
+
+
 def _hand_to_head(p: Array) -> Array:
     return np.linalg.norm(p[:, WRISTS] - p[:, J["head"], None], axis=-1).min(axis=1)
 
 
 def _wrist_speed(p: Array, fps: float) -> Array:
     return np.linalg.norm(np.gradient(in_body(p)[:, list(WRISTS)], axis=0), axis=-1) * fps
+
+
+def _throws(fastest: Array, hands: Sequence[int]) -> bool:
+    """Whether one of the hands threw, by the fastest that each was: as fast as the other at least."""
+    return float(fastest[list(hands)].max()) > max(2.4, float(fastest.max()) - 1e-9)
 
 
 def _from_start(p: Array) -> Array:

@@ -5,6 +5,8 @@ import re
 _ONES = ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "thirteen"]
 _ONES += ["fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen"]
 _SMALL = {word: number for number, word in enumerate(_ONES, start=1)}
+SMALL_NUMBERS = tuple(_ONES)
+"""Words of the numbers from one to nineteen."""
 _TENS = {"twenty": 20, "thirty": 30, "forty": 40, "fifty": 50, "sixty": 60, "seventy": 70, "eighty": 80, "ninety": 90}
 
 NUMBER = r"(\d+(?:\.\d+)?)"

@@ -31,9 +31,13 @@ _REPEATS = re.compile(
     r"|repeatedly|keeps?)\b",
     re.IGNORECASE,
 )
+_QUICK = re.compile(r"\b(?:wav|nod|shak|knock|clap|tap|pat|bounc|flap|point)\w*")
+"""Gestures whose strokes follow each other in less than a second."""
 _STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
 _ON_STAIRS = 4.0
 """People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
+_ON_THE_SPOT = re.compile(r"\b(?:jog|run|march|walk)\w* (?:\w+ly )?(?:in place|on (?:the|one) spot)\b", re.IGNORECASE)
+"""Who does so for longer leaves the place, or stands."""
 _ONE_FLIGHT = 3.0
 _LONGER = (
     (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
@@ -44,7 +48,7 @@ _LONGER = (
 MOST_AT_ONCE = 9.8
 """The longest motion of the recordings that the weights were trained on."""
 _REPEATED = re.compile(
-    r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ )?"
+    r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ ){0,2}"
     r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
     r"|burpees|crunches|claps|nods|bows|hops"
     r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches"
@@ -80,14 +84,20 @@ def natural_seconds(text: str) -> float:
         seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
     if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
         seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
-    elif match := re.search(r"\b(\d+|[a-z]+) times\b", words):
+    elif (
+        (match := re.search(r"\b(\d+|[a-z]+) (?:times|reps|repetitions)\b", words))
+        and kind == "gesture"
+        and _QUICK.search(words)
+    ):
+        seconds = min(seconds, 2.0 + 0.8 * (_count(match[1]) or 2))
+    elif match:
         seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
     elif re.search(r"\b(twice|thrice)\b", words):
         seconds *= 1.6 if "twice" in words else 2.2
     elif match := _REPEATED.search(words):
         seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
     if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", words):
-        seconds = max(seconds, 6.0)
+        seconds = max(seconds, 8.0 if kind == "locomotion" else 6.0)
     if re.search(r"\b(slowly|slow|carefully|gently)\b", words):
         seconds *= 1.3
     elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", words):
@@ -102,17 +112,17 @@ def seconds_alone(text: str) -> float:
     """
     goes_on = _kind(text.lower()) in _GOES_ON and not _FALLS.search(text.lower())
     if read_seconds(text) is None and (goes_on or _REPEATS.search(text)):
-        return _ON_STAIRS if _STAIRS.search(text) else max(natural_seconds(text), WHOLE)
+        return _ON_STAIRS if _STAIRS.search(text) or _ON_THE_SPOT.search(text) else max(natural_seconds(text), WHOLE)
     return natural_seconds(text)
 
 
 def flights(text: str, seconds: float) -> int:
-    """In how many parts somebody goes up stairs for so many seconds; 1 for other words.
+    """In how many parts somebody goes up stairs, or walks in place, for so many seconds; 1 for other words.
 
     People were recorded there for `_ON_STAIRS` seconds at most, and what is longer hardly rises (docs/decisions/0036).
     """
     up = _STAIRS.search(text) and not re.search(r"\bdown(?:stairs)?\b|\bdescend", text, re.IGNORECASE)
-    return math.ceil(seconds / _ONE_FLIGHT) if up and seconds > _ON_STAIRS else 1
+    return math.ceil(seconds / _ONE_FLIGHT) if (up or _ON_THE_SPOT.search(text)) and seconds > _ON_STAIRS else 1
 
 
 def _kind(words: str) -> str:

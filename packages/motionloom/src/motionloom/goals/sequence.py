@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motionloom.goals.amounts import read_amount, read_seconds
+from motionloom.goals.ellipsis import SQUATS, STAYS, WALKS, form_of, in_base, repeat_cycles, resolve_ellipsis
 from motionloom.goals.seconds import LONGEST, MOST_AT_ONCE, SHORTEST, natural_seconds, seconds_alone
 from motionloom.goals.verbs import (
     MOODS,
     NOUNS_AFTER,
     PRONOUN,
-    base_of,
     finite,
     kind_of,
     mood_of,
@@ -28,6 +28,8 @@ from motionloom.goals.verbs import (
 )
 
 MOST_PARTS = 20
+_AGAIN = 0.5
+"""Share of its time that a gesture takes which is repeated with its reverse."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,11 @@ _THEN = re.compile(
     re.IGNORECASE,
 )
 _NO_SEPARATOR = re.compile(
-    r"\b(?:now|every now|first|only|just|since|until|till|by|back|next to|(?<!the )right|what) (?:and )?then\b", re.I
+    r"\b(?:now|every now|first|only|just|since|until|till|by|next to|(?<!the )right|what) (?:and )?then\b|^back then\b",
+    re.IGNORECASE,
+)
+_SIDESTEPS = re.compile(
+    r"(^|\b(?:person|man|woman|figure|someone|somebody|he|she|they|it|and|then)) ?side[ -]steps\b", re.I
 )
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
@@ -74,6 +80,22 @@ _POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch
 _DOWN = re.compile(r"take a seat\b.*|(?:drop|go|get|sink|fall|take) (?:(?!up |off )\w+ ){0,3}knees?\b.*", re.IGNORECASE)
 _WHERE_LOW = re.compile(r"\bon (?:the|his|her|their|its) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE)
 
+_HEAD_OR_HANDS = re.compile(
+    r"(?:puts?|putting|places?|placing|drops?|buries) "
+    r"(?:his|her|their|its|the|both) (?:head|face|chin|hands?|arms?|feet)\b"
+)
+_TOGETHER = (
+    (
+        ("bend", "stoop", "crouch", "lean"),
+        ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
+    ),
+    (("reach",), ("pick", "grab", "take", "get")),
+    (("stumble", "trip", "slip", "stagger", "lose"), ("fall", "crash", "collapse", "tumble", "land")),
+)
+"""Somebody bends and grasps, stumbles and falls at once."""
+_COMES_UP = re.compile(r"(?:stand|come|get|go|rise|straighten) (?:right |straight )?(?:back )?up\b", re.IGNORECASE)
+"""What only ends each of several repetitions: "squats down and comes back up three times"."""
+
 
 def split_actions(text: str) -> tuple[Part, ...]:
     """The actions of a sentence that follow each other, each a sentence of its own with the seconds it takes.
@@ -81,7 +103,7 @@ def split_actions(text: str) -> tuple[Part, ...]:
     One part, the text as it is, where the sentence says one thing or things at once; at most `MOST_PARTS`, else it is
     left whole too.
     """
-    whole = " ".join(text.split()).rstrip(" .;,")
+    whole = _SIDESTEPS.sub(r"\1 sidesteps", " ".join(text.split()).rstrip(" .;,"))
     clauses = [clause for sentence in _split_by_time(whole) for clause in _split_by_then(sentence)]
     if len(clauses) > 1:
         clauses[0] = re.sub(r"^first,? (?=\w+ \w)|,? first$", "", clauses[0], flags=re.IGNORECASE)
@@ -104,11 +126,16 @@ def split_actions(text: str) -> tuple[Part, ...]:
         whole_clause = _SUBORDINATE.search(named) or re.search(r"\brun-?up\b", rest, re.IGNORECASE)
         items = [rest] if whole_clause else _split_list(rest)
         parts += [_sentence(named, finite(item)) for item in items]
-    parts = resolve_ellipsis(parts)
+    cycles = repeat_cycles(parts, MOST_PARTS)
+    parts = cycles or resolve_ellipsis(parts)
     if not 1 < len(parts) <= MOST_PARTS:
         return (Part(text, natural_seconds(text)),)
     last = len(parts) - 1
     seconds = [_part_seconds(part) if i < last else natural_seconds(part) for i, part in enumerate(parts)]
+    if cycles:  # who does so again and again holds nothing
+        seconds = [
+            _AGAIN * one if kind_of(part, mood_of(part)) == "gesture" else one for part, one in zip(parts, seconds)
+        ]
     rested = _merge_rests([Part(*both) for both in zip(_keep_postures(parts), seconds, strict=True)])
     return tuple(rested) if len(rested) > 1 else (Part(text, rested[0].seconds),)
 
@@ -119,7 +146,9 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
     for part in parts:
         rest = part.text.removeprefix(subject_of(part.text)).strip()
         before = _first_verb(result[-1].text) if result else "walk"
-        if (_LASTS.match(rest) and before in _POSTURES) or (_STAYS.match(_in_base(rest)) and before not in _WALKS):
+        if (_LASTS.match(rest) and before in _POSTURES) or (
+            STAYS.match(in_base(rest)) and (before not in WALKS or SQUATS.search(result[-1].text))
+        ):
             both = result[-1].seconds + part.seconds
             result[-1] = Part(result[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
         else:
@@ -139,14 +168,14 @@ def _keep_postures(parts: Sequence[str]) -> list[str]:
         named = subject_of(part)
         rest = part.removeprefix(named).strip()
         mood, verb = mood_of(rest), _first_verb(part)
-        if _STAYS.match(_in_base(rest)):
+        if STAYS.match(in_base(rest)):
             pass
-        elif verb in _POSTURES or _DOWN.fullmatch(_in_base(rest)):
+        elif verb in _POSTURES or _DOWN.fullmatch(in_base(rest)):
             posture = _POSTURES.get(verb, "kneel" if "knee" in rest else "sit")
             where = _WHERE_LOW.search(rest)
             place = f" {where[0]}" if where and posture in ("sit", "lie") else ""
-        elif posture and (kind_of(part, mood) == "gesture" or verb == "lean"):
-            part = f"{named} {_form(posture, mood)}{place} and {rest}".strip()
+        elif posture and (kind_of(part, mood) == "gesture" or verb == "lean" or _HEAD_OR_HANDS.match(rest)):
+            part = f"{named} {form_of(posture, mood)}{place} and {rest}".strip()
         elif not _WAITS.match(rest):
             posture = ""
         result.append(part)
@@ -250,13 +279,14 @@ def _split_list(clause: str) -> list[str]:
             joins.append(join)
         else:
             items[-1] += join + piece
-    if len(items) < 2 or (len(items) == 2 and _COMES_UP.match(_in_base(items[1])) and read_amount(clause)):
+    if len(items) < 2 or (len(items) == 2 and _COMES_UP.match(in_base(items[1])) and read_amount(clause)):
         return [clause]
     if len(items) > 2:
         return items
     comma = mood != "gerund" and not re.search(r"\band\b", joins[0], re.IGNORECASE)
     kinds = kind_of(items[0], mood), kind_of(items[1], mood)
-    counted = "gesture" not in kinds and any(read_amount(item) for item in items)
+    amounts = [read_amount(item) for item in items]
+    counted = any(one and (one.kind == "turn" or "gesture" not in kinds) for one in amounts)
     waits = kinds[0] == "state" and bool(_WAITS.match(items[1]))  # "stands there and waits"
     verbs = verb_of(items[0], mood), verb_of(items[1], mood)
     together = not comma and any(verbs[0] in first and verbs[1] in second for first, second in _TOGETHER)
@@ -308,139 +338,3 @@ def _is_subordinate(item: str, join: str, piece: str) -> bool:
     if _COUNTED.search(item) and _STOPS.fullmatch(piece.strip()):
         return True
     return "," not in join and bool(_SUBORDINATE.search(item))
-
-
-# Parts of a sentence that say what is done only together with the part before. A part is generated by itself, so it
-# must be a whole sentence: what only ends the action before ("bows and straightens up") remains part of it, what
-# omits words of it ("raises the right arm, then the left") gets them back, what returns to where it began is
-# rephrased as what people then do ("turns around and walks back": forward).
-
-_SIDE_ALONE = re.compile(
-    r"(?:(?:with|to) )?(?:(?:the|his|her|their|its|your|my) )?(left|right)"
-    r"(?: (?:one|arm|hand|leg|foot|knee|fist|side|elbow|shoulder))?(?: goes up)?(?: too| as well)?",
-    re.IGNORECASE,
-)
-_THING_ALONE = re.compile(r"(?:a|an|one|another|two|three) (?:[a-z-]+ ){0,2}[a-z-]+", re.IGNORECASE)
-_ENDS = re.compile(
-    r"straighten(?: (?:back )?up)?(?: again)?"
-    r"|(?=.*\b(?:back|again|right|straight)\b)"
-    r"(?:come|go|pop) (?:right |straight |quickly |slowly )?(?:back )?up(?: again)?",
-    re.IGNORECASE,
-)
-"""The end of bowing, bending, ducking."""
-_SQUATS = re.compile(r"\b(?:squat|lunge)", re.IGNORECASE)
-_RISES_AGAIN = re.compile(r"(?:stand|get|push|rise) (?:right |straight )?(?:back )?up(?: again)?", re.IGNORECASE)
-"""The end of a squat, which is no squat without."""
-_STAYS = re.compile(
-    r"(?:stay|remain) (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
-    r"|hold(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?= *$| for )",
-    re.IGNORECASE,
-)
-_TOGETHER = (
-    (
-        ("bend", "stoop", "crouch", "lean"),
-        ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
-    ),
-    (("stumble", "trip", "slip", "stagger", "lose"), ("fall", "crash", "collapse", "tumble", "land")),
-)
-"""Somebody bends and grasps, stumbles and falls at once."""
-_WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
-"""Who stays somewhere after these stands still, which is an action of its own."""
-_UP_AGAIN = re.compile(
-    r"(?:get|come|go|rise) (?:right |straight )?(?:back )?"
-    r"(?:up|(?:on)?to (?:his|her|their|your) feet|on (?:his|her|their|your) feet)(?: again)?",
-    re.IGNORECASE,
-)
-_COMES_UP = re.compile(r"(?:stand|come|get|go|rise|straighten) (?:right |straight )?(?:back )?up\b", re.IGNORECASE)
-"""What only ends each of several repetitions: "squats down and comes back up three times"."""
-_BACK_AGAIN = re.compile(r"(walk|run|jog|come|go) back\b.*|return\b.*", re.IGNORECASE)
-_OBJECT = re.compile(
-    r"(?<!with )(?<!\bin )(?<!\bon )(?<!of )(?<!to )(?<!from )(?<!at )(?<!over )(?<!by )(?<=\w )"
-    r"((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+)"
-    r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again)\b)",
-    re.IGNORECASE,
-)
-"""A thing that something is done with: what "it" and "them" mean behind it."""
-_IT = re.compile(
-    r"^((?:\w+ly )?\w+(?: (?:from|at|with|on|over|into|to|through|under|for))?) (?:it|them)\b"
-    r"(?: back(?= (?:down|on|in|to)\b))?"
-)
-_NO_OBJECT = re.compile(r"(?:the|his|her|their|an?) (?:floor|ground|left|right|front|back|side|step)$", re.IGNORECASE)
-_STAIRS = re.compile(r"\bstairs?\b|\bstaircase\b", re.IGNORECASE)
-_TURNED = re.compile(r"\bturn(?:s|ed)? (?:around|round|about|back)\b", re.IGNORECASE)
-_SEATED = re.compile(r"\b(?:sits?|sat|seat)\b", re.IGNORECASE)
-_ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
-
-
-def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
-    """The parts of a sentence as sentences that say all by themselves; fewer where one only ends the one before.
-
-    parts: what is done one after the other, each with its subject if it has one.
-    """
-    result: list[str] = []
-    for part in parts:
-        if not result:
-            result.append(part)
-            continue
-        before = result[-1]
-        named = subject_of(part)
-        rest = part.removeprefix(named).strip()
-        if _only_ends(before, rest):
-            result[-1] = f"{before} and {rest}"
-        else:
-            result.append(
-                _with_repeated_words(before, part) or f"{named} {_rephrased(result[-MOST_PARTS:], rest)}".strip()
-            )
-    return result
-
-
-def _only_ends(before: str, rest: str) -> bool:
-    """Whether something only ends, or keeps, what was done before."""
-    rest = _in_base(rest)
-    if _ENDS.fullmatch(rest):
-        return not _SEATED.search(before)
-    if _SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
-        return True
-    first = verb_of(before.removeprefix(subject_of(before)).strip(), mood_of(before))
-    return bool(_STAYS.fullmatch(rest)) and first not in _WALKS
-
-
-def _with_repeated_words(before: str, part: str) -> str:
-    """The sentence before with the other side, or the other thing, that the part names alone; empty if it does not."""
-    alone = part.removeprefix(subject_of(before)).strip()
-    side = _SIDE_ALONE.fullmatch(alone)
-    if side:
-        other = {"left": "right", "right": "left"}[side[1].lower()]
-        return re.sub(rf"\b{other}\b", side[1].lower(), before) if re.search(rf"\b{other}\b", before) else ""
-    if _THING_ALONE.fullmatch(alone) and not any(base_of(word) in NOUNS_AFTER for word in alone.split(" ")):
-        ends = [match.end() for match in re.finditer(r"[a-z]+", before) if base_of(match[0]) in NOUNS_AFTER]
-        return f"{before[: ends[0]]} {alone}" if ends else ""
-    return ""
-
-
-def _rephrased(parts: Sequence[str], rest: str) -> str:
-    """The action in words that make sense without the parts before."""
-    mood, before, plain = mood_of(rest) or "third", parts[-1], _in_base(rest)
-    back = _BACK_AGAIN.fullmatch(plain)
-    if back and (on := re.fullmatch(r"\w+ back (up|down)", plain)) and any(map(_STAIRS.search, parts)):
-        return f"{_form('walk', mood)} {on[1]} the stairs"
-    if back and _TURNED.search(before):
-        moves = (back[1] or "walk").lower()
-        return f"{_form('walk' if moves in ('come', 'go') else moves, mood)} forward"
-    if (_UP_AGAIN.fullmatch(plain) or _ENDS.fullmatch(plain)) and _SEATED.search(before):
-        return f"{_form('stand', mood)} up{' from the floor' if _ON_THE_FLOOR.search(before) else ' again'}"
-    if _STAYS.match(plain):
-        return rest
-    named = [[one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] for part in reversed(parts)]
-    things = next(filter(None, named), [""])
-    thing = re.sub(r"^(?:an?|some|another|one)\b", "the", things[0], flags=re.IGNORECASE)
-    return _IT.sub(rf"\1 {thing}", rest, count=1) if thing else rest
-
-
-def _in_base(rest: str) -> str:
-    """What is done with its verb as in "to walk": "walked back again" as "walk back again"."""
-    return finite(rest, "base", of=mood_of(rest) or "third")
-
-
-def _form(base: str, mood: str) -> str:
-    return next(form for form, of in MOODS[mood].items() if of == base)
