@@ -59,6 +59,8 @@ _KNEE = 0.15
 """Leg lengths that a knee which is pulled up may be below the hip."""
 _HANGS, _SPREAD = 0.15, 0.4
 """Metres that a hanging hand is over the pelvis at most, and that hands of arms that are out are away from it."""
+_LEAPS, _CHAIR = 0.2, 0.45
+"""Metres that the pelvis of who falls rises by at most, and that the feet are over the floor of who lies."""
 _CROSSED = 0.27
 """Metres from a wrist to the other arm's elbow of who has crossed the arms."""
 _FOOT, _FLIGHT = 0.15, 0.34
@@ -323,7 +325,8 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
     if phrase.has(r"\bcrawl|\ball fours\b"):
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
     if phrase.has(_FALLS):
-        yield "a fall", lambda p, fps: _lasts(_over_floor(p) < _DOWN, 0.25, fps)
+        leaps = phrase.has(r"\b(?:jump|leap|flip|div|somersault)")
+        yield "a fall", lambda p, fps: _lasts(_over_floor(p) < _DOWN, 0.25, fps) and (leaps or _falls_as_people(p, fps))
 
 
 def _lasts(mask: np.ndarray, seconds: float, fps: float) -> bool:
@@ -342,6 +345,14 @@ def _sideways(p: Array) -> Array:
     """(frames,) radians by which the line from the pelvis to the neck is inclined to the body's left."""
     trunk = in_body(p)[:, J["neck"]] - in_body(p)[:, 0]
     return np.arctan2(trunk[:, 0], trunk[:, 1])
+
+
+def _falls_as_people(p: Array, fps: float) -> bool:
+    """Whether somebody who falls does not leap first, and does not hold the legs up who lies at the end."""
+    begin, end = p[: max(1, round(fps / 4))], p[-max(1, round(fps / 2)) :]
+    lies = float(end[:, 0, 1].mean()) < _DOWN * leg_length(p)
+    leaps = float(p[:, 0, 1].max() - np.median(begin[:, 0, 1])) > _LEAPS
+    return not leaps and not (lies and float(end[:, list(ANKLES), 1].max()) > _CHAIR)
 
 
 def _over_floor(p: Array) -> Array:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionloom.kinematics.gestures import true_spans
+from motionloom.kinematics.gestures import leg_length, true_spans
 from motionloom.kinematics.physics import ANKLES, TOES, Array, smooth, velocity
 
 UP = 0.12
@@ -21,6 +21,8 @@ AT_ONCE = 0.4
 """Metres from one foothold to the next that nobody goes down in one step."""
 RISES = np.arange(0.15, 0.205, 0.005)
 """Metres that steps may be high."""
+_ONE_LEVEL, _ON_THE_FLOOR = 0.1, 0.4
+"""Metres between footholds of one level; leg lengths of the pelvis over the floor of who sits or lies on it."""
 _SLOW = 0.6
 """Metres per second of a foot that bears."""
 
@@ -124,6 +126,18 @@ def hovering(positions: np.ndarray, fps: float) -> list[tuple[int, int]]:
     for hold in footholds(p, fps):
         borne[hold.first : hold.end] = True
     return _lasting((_lowest(p) > UP) & ~borne, fps)
+
+
+def falls_from_above(positions: np.ndarray, fps: float) -> bool:
+    """Whether somebody stands above the floor at first, on one level, and comes to sit or lie on the floor.
+
+    positions: (frames, 22, 3) metres. Recorded people fell onto mats, whose height was taken for the floor's.
+    """
+    p = np.asarray(positions, dtype=np.float64)
+    begins = float(np.median(_lowest(p)[: max(1, round(fps / 2))]))
+    above = [hold.height for hold in footholds(p, fps) if hold.height > UP]
+    on_one_level = bool(above) and max(abs(height - begins) for height in above) < _ONE_LEVEL
+    return begins > UP and on_one_level and float(p[:, 0, 1].min()) < _ON_THE_FLOOR * leg_length(p)
 
 
 def _lasting(flags: np.ndarray, fps: float) -> list[tuple[int, int]]:

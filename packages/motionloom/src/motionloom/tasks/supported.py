@@ -13,7 +13,7 @@ from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
-from motionloom.kinematics.stairs import UP, hovering
+from motionloom.kinematics.stairs import UP, falls_from_above, hovering
 from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
 
@@ -43,7 +43,7 @@ def add_support(motion: Motion, *, stairs: bool = True) -> Motion:
     motion: of the 22-joint person at 20 frames per second, on the floor y = 0. stairs: whether there may be steps.
     """
     places = motion.positions()
-    if hovering(places, motion.fps):
+    if hovering(places, motion.fps) or falls_from_above(places, motion.fps):
         motion = _grounded(motion, places)
     elif stairs:
         motion = _on_stairs(motion, places)
