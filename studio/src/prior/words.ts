@@ -180,7 +180,7 @@ function arc(phrase: string, verbs: ReadonlySet<string>): Amount | null {
   const [part, circle] = [first("arc", phrase), first("circle", phrase)];
   const side =
     sideOf(phrase) || (!part && circle && !has(verbs, RUNNING) && !/\b(?:left|right)\b/.test(phrase) ? "left" : "");
-  if (!(part ?? circle) || !side || !has(verbs, GOING) || first("body", phrase)) return null;
+  if (!(part ?? circle) || !side || !has(verbs, GOING) || first("body", phrase.replace(PATTERNS.held, ""))) return null;
   const size = part?.[1] ?? "full";
   const degrees = size === "quarter" ? 90 : ["half", "semi", "0.5"].includes(size) ? 180 : 360;
   const metres = (RADIUS * degrees * Math.PI) / 180;
@@ -221,7 +221,8 @@ function pace(phrase: string, verbs: ReadonlySet<string>): number {
 }
 
 const isSlow = (phrase: string): boolean => /\b(?:slowly|slow|carefully|careful|cautiously|gently)\b/.test(phrase);
-const isBackward = (phrase: string): boolean => /\b(?:backwards?|back|in reverse|rearwards?)\b/.test(phrase);
+const isBackward = (phrase: string): boolean =>
+  /\b(?:backwards?|(?<!his )(?<!her )(?<!its )(?<!their )back|in reverse|rearwards?)\b/.test(phrase);
 
 /** The one side that is said, seen from above for clockwise; empty for none and for both. */
 function sideOf(phrase: string): string {

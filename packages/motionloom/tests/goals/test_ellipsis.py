@@ -73,6 +73,16 @@ PARTS = {
         "he carries the box a few steps",
         "he sets the box down",
     ],
+    "drink from a bottle and put it down": ["drink from a bottle", "put the bottle down"],
+    "she walks up to a chair and sits down with legs crossed": [
+        "she walks up to a chair",
+        "she sits down with legs crossed on the chair",
+    ],
+    # the end of a bend
+    "he bends down to touch his toes, comes up and waves": [
+        "he bends down to touch his toes and comes up",
+        "he waves",
+    ],
     # hands and heads leave nobody standing up
     "he sits down, and puts his head in his hands": ["he sits down", "he sits and puts his head in his hands"],
     # nothing in the part before that could be different

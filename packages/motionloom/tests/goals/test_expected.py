@@ -66,6 +66,33 @@ def at_shoulders() -> np.ndarray:
     return with_hands(0, 1, at=lambda p: p[:, J["neck"]] - [0, 0.1, 0])
 
 
+def with_crossed_arms() -> np.ndarray:
+    p = standing()
+    wrists, elbows = [J["left_wrist"], J["right_wrist"]], [J["right_elbow"], J["left_elbow"]]
+    p[:, wrists] = p[:, elbows] + [0, 0, 0.1]
+    return p
+
+
+def leaning(degrees: float) -> np.ndarray:
+    """Somebody whose trunk leans to the left."""
+    p, angle = standing(), np.radians(degrees)
+    above = p[..., 1] > p[:, :1, 1]
+    height = np.where(above, p[..., 1] - p[:, :1, 1], 0)
+    p[..., 0] += height * np.sin(angle)
+    p[..., 1] += height * (np.cos(angle) - 1)
+    return p
+
+
+def bent(degrees: float) -> np.ndarray:
+    """Somebody whose trunk is bent forward."""
+    p, angle = standing(), np.radians(degrees)
+    above = p[..., 1] > p[:, :1, 1]
+    height = np.where(above, p[..., 1] - p[:, :1, 1], 0)
+    p[..., 2] += height * np.sin(angle)
+    p[..., 1] += height * (np.cos(angle) - 1)
+    return p
+
+
 def lying(up: int) -> np.ndarray:
     """Somebody who lies on the back (1) or on the belly (-1)."""
     p = standing()
@@ -114,6 +141,12 @@ def rising(p: np.ndarray, metres: float) -> np.ndarray:
         ("she lowers the left arm", raising(1), raising(0)),
         ("he raises both arms to shoulder height", at_shoulders(), standing()),
         ("he lies down on his back", lying(1), lying(-1)),
+        ("she talks to somebody", standing(), walking(1.2)),
+        ("he crosses his arms", with_crossed_arms(), standing()),
+        ("a man bends to the left", leaning(20), leaning(-20)),
+        ("he bends down", bent(70), standing()),
+        ("she puts a hand to her forehead", with_hands(0, at=lambda p: p[:, J["head"]] + [0, 0, 0.15]), standing()),
+        ("a man falls", lying(1), np.concatenate([jumping(0.5)[:40], lying(1)[:40]])),
         ("he drinks", with_hands(0, at=lambda p: p[:, J["head"]] + [0, 0, 0.15]), standing()),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -130,7 +163,7 @@ def test_what_is_done(text: str, does: np.ndarray, does_not: np.ndarray) -> None
     [
         "a person dances",
         "a zombie",
-        "a person looks at the left hand",
+        "a man plays chess",
         "go down on your knees",
         "a man does sit-ups",
         "a chef rolls dough and flips a pancake",

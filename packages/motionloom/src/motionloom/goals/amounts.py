@@ -1,8 +1,8 @@
 """Numbers with units in a sentence: how far, how many steps, how much of a turn, how long, how often.
 
 "turns left 90 degrees", "walks 3 meters forward", "takes three steps back", "walks in a half circle to the right",
-"for ten seconds", "jumps twice". Plain text work by written rules (docs/words.md); what could mean something else,
-"a man of 25 years", "turns his head 45 degrees", "throws a ball 10 meters", is not read.
+"for ten seconds", "jumps twice". What could mean something else, "a man of 25 years",
+"throws a ball 10 meters", is not read (docs/words.md).
 """
 
 import math
@@ -125,7 +125,7 @@ _COUNTED: tuple[tuple[str, Counted], ...] = (
     (r"jump\w*|leaps?|leaping", "jumps"),
     (r"hops?|hopping|hopped", "hops"),
     (r"squat\w*", "squats"),
-    (r"kicks?|kicking|kicked", "kicks"),
+    (r"(?<!butt )kicks?|kicking|kicked", "kicks"),
     (r"punch\w*|jabs?|jabbing|strikes? with (?:the|his|her) fist", "punches"),
     (r"(?<!a )bow(?:s|ing|ed)?(?! tie)", "bows"),
     (r"claps?|clapping|clapped", "claps"),
@@ -282,7 +282,7 @@ def _arc(phrase: str, verbs: list[str]) -> Amount | None:
     match, side = _ARC.search(phrase) or _CIRCLE.search(phrase), _side(phrase)
     if match and match.re is _CIRCLE and not (set(verbs) & _RUNS or re.search(r"\b(?:left|right)\b", phrase)):
         side = side or "left"
-    if not match or not side or not set(verbs) & _GOING or _BODY.search(phrase):
+    if not match or not side or not set(verbs) & _GOING or _BODY.search(_HELD.sub("", phrase)):
         return None
     backward = _is_backward(phrase)
     size = match[1] if match.re is _ARC else "full"
@@ -337,7 +337,9 @@ def _is_slow(phrase: str) -> bool:
 
 
 def _is_backward(phrase: str) -> bool:
-    return bool(re.search(r"\b(?:backwards?|back|in reverse|rearwards?)\b", phrase))
+    return bool(
+        re.search(r"\b(?:backwards?|(?<!his )(?<!her )(?<!its )(?<!their )back|in reverse|rearwards?)\b", phrase)
+    )
 
 
 def _side(phrase: str) -> Side:

@@ -46,8 +46,11 @@ _ENDS = re.compile(
     re.IGNORECASE,
 )
 """The end of bowing, bending, ducking."""
+_BENT = re.compile(r"\b(?:bend|bow|duck|stoop|squat)|\btouch\w* (?:\w+ )?toes\b", re.IGNORECASE)
+_COMES_UP = re.compile(r"(?:slowly )?(?:come|go) (?:slowly )?up(?: slowly)?", re.IGNORECASE)
 _RETURNS = re.compile(
-    r"(?:return|come back|go back|get back)(?: back)? (?:in)?to (?:(?:an?|the|his|her|their|your) )?"
+    r"(?:slowly )?(?:return|come back|go back|get back|roll up)(?: slowly| back)* (?:in)?to "
+    r"(?:(?:an?|the|his|her|their|your) )?"
     r"(?:standing|upright|start(?:ing)?|initial|original|neutral|first|normal)(?: (?:position|pose|posture|stance))?",
     re.IGNORECASE,
 )
@@ -58,7 +61,7 @@ _RISES_AGAIN = re.compile(r"(?:stand|get|push|rise) (?:right |straight )?(?:back
 """The end of a squat, which is no squat without."""
 STAYS = re.compile(
     r"(?:stay|remain) (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
-    r"|hold(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?= *$| for )",
+    r"|hold(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?: briefly| there)?(?= *$| for )",
     re.IGNORECASE,
 )
 WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
@@ -69,9 +72,11 @@ _UP_AGAIN = re.compile(
     re.IGNORECASE,
 )
 _BACK_AGAIN = re.compile(r"(walk|run|jog|come|go) back\b.*|return\b.*", re.IGNORECASE)
+_VESSEL = re.compile(r"\bfrom ((?:an?|the|his|her|their) (?:\w+ )?(?:bottle|glass|cup|mug|can|bowl))\b", re.IGNORECASE)
 _OBJECT = re.compile(
     r"(?<!with )(?<!\bin )(?<!\bon )(?<!of )(?<!to )(?<!from )(?<!at )(?<!over )(?<!by )(?<=\w )"
-    r"((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+)"
+    r"((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+"
+    r"|something(?: heavy| light| big| small)?)"
     r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again)\b)",
     re.IGNORECASE,
 )
@@ -93,6 +98,8 @@ _GOES_AWAY = re.compile(
 )
 """What somebody does who has turned around to do it."""
 _SEATED = re.compile(r"\b(?:sits?|sat|seat)\b", re.IGNORECASE)
+_SITS = re.compile(r"(?:\w+ly )?sit(?: down)? with (?:(?:his|her|their) )?(?:legs crossed|crossed legs)", re.IGNORECASE)
+_SEATS = re.compile(r"\b(chair|bench|sofa|couch|stool|armchair|throne)\b")
 _CROUCHED = re.compile(r"\b(?:crouch|squat|kneel|duck)\w*|\bknelt\b", re.IGNORECASE)
 _ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
 _CYCLES = (
@@ -102,6 +109,7 @@ _CYCLES = (
 )
 _CYCLES_BEHIND_A_COMMA = (
     (r".*\bforwards?\b", r".*\bback(?:wards?)?\b"),
+    (r".*\bup\b", r".*\bdown\b"),
     (r".*\bleft\b", r".*\bright\b"),
     (r".*\bright\b", r".*\bleft\b"),
 )
@@ -158,6 +166,8 @@ def _only_ends(before: str, rest: str) -> bool:
     rest = in_base(rest)
     if _ENDS.fullmatch(rest):
         return not _SEATED.search(before)
+    if _COMES_UP.fullmatch(rest) and _BENT.search(before):
+        return True
     if _RETURNS.fullmatch(rest):
         return not _LOW.search(before) and not STAYS.match(in_base(before.removeprefix(subject_of(before)).strip()))
     if SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
@@ -246,7 +256,12 @@ def _rephrased(parts: Sequence[str], rest: str) -> str:
         return f"{form_of('stand', mood)} up{' from the floor' if _ON_THE_FLOOR.search(before) else ' again'}"
     if STAYS.match(plain):
         return rest
-    named = [[one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] for part in reversed(parts)]
+    if _SITS.fullmatch(plain) and (seats := [seat for part in parts for seat in _SEATS.findall(part.lower())]):
+        return f"{rest} on the {seats[-1]}"
+    named = [
+        [one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] + _VESSEL.findall(part)
+        for part in reversed(parts)
+    ]
     things = next(filter(None, named), [""])
     thing = re.sub(r"^(?:an?|some|another|one)\b", "the", things[0], flags=re.IGNORECASE)
     return _IT.sub(rf"\1 {thing}", rest, count=1) if thing else rest

@@ -75,6 +75,8 @@ _IN_PLACE = (
     r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)"
     r"|(?:jump|hop|bounc)\w* up and down)\b"
 )
+_STAYS_THERE = r"\b(?:roll|swing|slip|stretch)\w*\b.*\b(?:shoulder|arm|leg|head|backward)|\btoes\b"
+"""What is done backwards on the spot."""
 _WAY_BACK = (
     r"\b(?:walks? back|walking back|comes? back|returns?)\b(?! (?:and forth|up)\b)"
     r"(?! to (?:an? |the |his |her |their )?(?:stand|upright|start|initial|original|neutral|normal))"
@@ -88,11 +90,21 @@ _TUMBLES = (
     r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
     r"|rolls? (?:forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
 )
+_SEAT = r"\b(?:chair|seat|bench|stool|sofa|couch)\b"
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
 _SIDE_BEND = (
     r"\b(?:lean|bend|tilt)(?:s|ing|ed)? (?:\w+ )?(?:sideways )?(?:over )?to(?:wards?)? "
-    r"(?:the|his|her|their) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
+    r"(?<!head to )(?:the|his|her|their) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
 )
+_STANDS = (
+    r"\b(?:rais|lift|wav|clap|point|nod|salut|cheer|drink|eat|look|cross|fold|stretch|shrug|talk|gestur|beckon|yawn|laugh"
+    r"|cry|cries|smil|sing|shout|scratch|hold|knock|brush)(?:e?s|ed|ing|ging|ding|ping)?\b"
+)
+_NOT_STANDING = (
+    r"\b(?:sit|seat|lie|lay|kneel|knelt|crouch|squat|floor|ground|bed|chair|knee|bend|bent|lean|stair|ladder|walk|leg|foot|feet"
+    r"|toe|step|circle|it\b|box|heavy|weight|barbell|dumbbell|forward|back|shoe|tired|exhaust|horse|baby|plank|push-?up)"
+)
+"""Gestures of who stands, and words of somebody who may do something else."""
 _FALLS = (
     r"(?<!\bwithout )(?<!\bnot )(?<!\balmost )(?<!\bnearly )(?<!n't )\b(?:falls?|falling|fell|collapses?|collapsing)\b"
     r"(?! (?:asleep|behind|back|in love|silent)\b)"
@@ -214,9 +226,13 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
             ("a way down" if falls else "a way up"),
             lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > _FLIGHT,
         )
-    elif phrase.has(f"{_GAIT}|{_BACKWARDS}") and not turns and not phrase.has(_FALLS):
+    elif _travels(phrase) and not turns and not phrase.has(_FALLS):
         yield _direction(phrase, side, sign)
     yield from _paces(phrase)
+
+
+def _travels(phrase: _Phrase) -> bool:
+    return phrase.has(_GAIT) or (phrase.has(_BACKWARDS) and not phrase.has(_STAYS_THERE))
 
 
 def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
@@ -239,17 +255,17 @@ def _paces(phrase: _Phrase) -> Iterator[_Named]:
         yield "a fast walk", lambda p, fps: _pace(p, fps) > _BRISK
     elif walks and phrase.has(r"\bslow(?:ly)?\b|\bleisure"):
         yield "a slow walk", lambda p, fps: _pace(p, fps) < _SLOW
-    if phrase.has(r"\b(?:stops|halts?|comes to a (?:stop|halt|standstill))\b") and phrase.has(_GAIT):
+    if phrase.has(r"\b(?:stops|halts|comes to a (?:stop|halt|standstill))\b|^(?:stop|halt|come to a stop)\b(?! sign)"):
         yield "a stop", lambda p, fps: float(speed(p, fps)[-max(1, round(fps / 4)) :].mean()) < 0.3
 
 
 def _postures(phrase: _Phrase) -> Iterator[_Named]:
     sits = phrase.has(r"\b(?:sit|sits|sitting|sat|takes? a seat|taking a seat)\b(?!-| ups?\b)")
-    if sits and phrase.has(_FLOOR):
+    if sits and phrase.has(_FLOOR) and not phrase.has(_SEAT):
         yield "sitting on the floor", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & _upright(p), 1.0, fps)
     elif sits:
         yield "sitting", lambda p, fps: bool(seats(p, fps, shortest=0.5))
-    elif phrase.has(r"\b(?:chair|seat|bench|stool)\b") and "change" in phrase.kinds:
+    elif phrase.has(_SEAT) and "change" in phrase.kinds:
         yield "sitting at the start", lambda p, fps: any(one.begin < 1 for one in seats(p, fps, shortest=0.25))
     if phrase.has(r"\b(?:lie|lies|lying)\b|\blay(?:s|ing)? down\b") and not phrase.has(
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
@@ -296,18 +312,17 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a wave", lambda p, fps: max(wrist_swings(p, fps, amplitude=0.05)[hand] for hand in hands) >= 3
     if phrase.has(r"\b(?:cross|fold)\w* (?:\w+ )?arms\b|\barms (?:crossed|folded)\b|\bcrossed arms\b"):
         yield "crossed arms", lambda p, fps: _lasts(_hands_to_elbows(p) < _CROSSED, 0.3 * len(p) / fps, fps)
-    if phrase.has(r"\broll\w* (?:\w+ )?shoulders?\b"):
-        yield "standing", lambda p, fps: float(pelvis_height(p).min()) > _LOW
     if phrase.has(r"\bhands? (?:to|on|over|against) (?:the|his|her|their) (?:forehead|head|face|eyes|ears?|brow)\b"):
         yield "a hand at the head", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(r"\bhands? on (?:the |his |her |their )?(?:hips|waist)\b"):
         yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
     if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(_NO_THROW):
         yield "a throw", lambda p, fps: _throws(_wrist_speed(p, fps).max(axis=0), hands)
-    if phrase.has(r"\b(?:drink|sip|takes? a bite|eat)"):
+    if phrase.has(r"(?<!\ba )(?<!\bthe )(?<!\bhis )(?<!\bher )\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(
-        r"\b(?:pick|grab|touch)", r"\b(?:floor|ground|bends?|bending|stoops?|(?:the|his|her|their) (?:toes|feet))\b"
+        r"\b(?:pick|grab|touch)",
+        r"\b(?:floor|ground|bends?|bending|stoops?|(?:the|his|her|their|its|your|my) (?:toes|feet))\b",
     ):
         yield "a hand at the floor", lambda p, fps: float(_hands_over_floor(p).min()) < _DOWN
 
@@ -315,6 +330,8 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
 def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
     if phrase.has(_TUMBLES):
         yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
+    if phrase.has(_STANDS) and phrase.kinds <= {"gesture", "state"} and not phrase.has(_NOT_STANDING):
+        yield "standing upright", _stands
     if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
     if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b"):
@@ -345,6 +362,13 @@ def _sideways(p: Array) -> Array:
     """(frames,) radians by which the line from the pelvis to the neck is inclined to the body's left."""
     trunk = in_body(p)[:, J["neck"]] - in_body(p)[:, 0]
     return np.arctan2(trunk[:, 0], trunk[:, 1])
+
+
+def _stands(p: Array, fps: float) -> bool:
+    """Whether somebody stands upright in one place."""
+    upright = float(np.median(torso_inclination(p))) < _UPRIGHT / 2 and float(pelvis_height(p).min()) > _LOW - 0.05
+    leaps = float(p[:, 0, 1].max() - np.median(p[: max(1, round(fps / 4)), 0, 1])) > _LEAPS
+    return upright and not leaps and float(np.hypot(*_from_start(p).T).max()) < 1.0
 
 
 def _falls_as_people(p: Array, fps: float) -> bool:

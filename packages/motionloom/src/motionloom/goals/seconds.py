@@ -31,7 +31,7 @@ _REPEATS = re.compile(
     r"|repeatedly|keeps?)\b",
     re.IGNORECASE,
 )
-_QUICK = re.compile(r"\b(?:wav|nod|shak|knock|clap|tap|pat|bounc|flap|point)\w*")
+_QUICK = re.compile(r"\b(?:wav|nod|shak|knock|clap|tap|pat|bounc|flap|point|swing)\w*")
 """Gestures whose strokes follow each other in less than a second."""
 _STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
 _ON_STAIRS = 4.0
@@ -84,14 +84,10 @@ def natural_seconds(text: str) -> float:
         seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
     if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
         seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
-    elif (
-        (match := re.search(r"\b(\d+|[a-z]+) (?:times|reps|repetitions)\b", words))
-        and kind == "gesture"
-        and _QUICK.search(words)
-    ):
-        seconds = min(seconds, 2.0 + 0.8 * (_count(match[1]) or 2))
-    elif match:
-        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
+    elif match := re.search(r"\b(\d+|[a-z]+) (?:times|reps|repetitions)\b", words):
+        number = _count(match[1]) or 2
+        quick = kind == "gesture" and _QUICK.search(words)
+        seconds = 2.0 + 0.8 * number if quick else seconds * (0.4 + 0.6 * number)
     elif re.search(r"\b(twice|thrice)\b", words):
         seconds *= 1.6 if "twice" in words else 2.2
     elif match := _REPEATED.search(words):
