@@ -23,6 +23,7 @@ PATTERNS = {
     "body": amounts._BODY,
     "held": amounts._HELD,
     "travels": amounts._TRAVELS,
+    "on_one_leg": amounts._ON_ONE_LEG,
     "else": amounts._ELSE,
     "number_words": numerals._WORDS,
     "and_a_half": numerals._HALF,

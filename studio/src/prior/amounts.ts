@@ -63,11 +63,17 @@ export function partsOf(text: string, seconds: number, amount: Amount | null, fp
     return [{ ...whole, way: wayFor(asked, seconds, fps) }];
   }
   const [stroke, single] = [tables.strokes[amount.of!], once(text)];
-  if (stroke < CHAINED) return [{ ...whole, text: single, seconds: Math.max(1, rounded(seconds * fps)) / fps }];
-  const each = Math.max(1, rounded(Math.min(stroke, seconds / amount.size) * fps)) / fps;
-  const places = Array.from({ length: rounded(each * fps) }, (): Place => [0, 0]);
-  const way = amount.inPlace ? { places, facing: null } : null;
-  const part = { text: single, seconds: each, transition: Math.min(TRANSITION, each / 2), way };
+  const frames = (length: number): number => Math.max(1, rounded(length * fps));
+  const way = (length: number): Way | null =>
+    amount.inPlace ? { places: Array.from({ length }, (): Place => [0, 0]), facing: null } : null;
+  if (stroke < CHAINED) return [{ ...whole, text: single, seconds: frames(seconds) / fps, way: way(frames(seconds)) }];
+  const each = frames(Math.min(stroke, seconds / amount.size)) / fps;
+  const part = {
+    text: single,
+    seconds: each,
+    transition: Math.min(TRANSITION, each / 2),
+    way: way(rounded(each * fps)),
+  };
   return Array.from({ length: amount.size }, () => part);
 }
 

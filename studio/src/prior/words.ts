@@ -151,7 +151,7 @@ function repetitions(phrase: string): Amount | null {
   const size = many[0] ? Number(many[0][1]) : often(times[0]![1]!, times[0]![2]);
   if (kinds.length !== 1 || !Number.isInteger(size) || size < 1 || size > MOST_TIMES) return null;
   const [side, of] = [sideOf(phrase), kinds[0]!];
-  const inPlace = of === "jumps" && !first("travels", phrase);
+  const inPlace = ["jumps", "hops"].includes(of!) && !first("travels", phrase.replace(PATTERNS.on_one_leg, ""));
   return amount("count", size, side ? sideways(side) : "forward", { of, inPlace });
 }
 

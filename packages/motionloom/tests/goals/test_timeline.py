@@ -76,6 +76,8 @@ def test_a_length_changes_how_long_a_way_takes_and_not_where_it_leads(seconds: f
         ("a person jumps forward twice", False),
         ("a person jumps over the fence twice", False),
         ("a person bows twice", False),
+        ("a person hops on the left foot four times", True),
+        ("a person hops to the left four times", False),
     ],
 )
 def test_counted_jumps_stay_in_place_unless_they_lead_somewhere(text: str, in_place: bool) -> None:
@@ -471,6 +473,8 @@ def test_numbers_beyond_all_bounds_are_some_seconds(text: str, amounts: bool) ->
         ("she walks down the stairs", 8.0, [8.0]),
         ("he goes downstairs", 8.0, [8.0]),
         ("a man walks up", 8.0, [8.0]),
+        ("a man marches in place", 4.0, [4.0]),
+        ("march on the spot with high knees", 9.0, [3.0, 3.0, 3.0]),
     ],
 )
 def test_who_goes_up_stairs_for_long_does_so_in_parts(text: str, seconds: float, parts: list[float]) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.kinematics.physics import WRISTS, J
-from motionloom.kinematics.stairs import hovering, stairs
+from motionloom.kinematics.stairs import falls_from_above, hovering, stairs
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated
@@ -53,6 +53,23 @@ def test_who_hovers_comes_down_and_who_stands_or_sits_high_stays() -> None:
     jump = lifted(np.maximum(0.0, 2.5 * (t - 1) - 9.81 / 2 * (t - 1) ** 2) * (t > 1))
     for other in (jump, lifted(np.zeros(60)), lifted(np.full(60, 0.3))):
         assert add_support(other) is other
+
+
+def test_who_falls_from_above_the_floor_stood_on_it() -> None:
+    """Who stands a quarter of a metre high and then lies on the floor; who sits down up there stays."""
+    high = lifted(np.full(60, 0.25))
+    flat = np.array([np.cos(np.pi / 4), np.sin(np.pi / 4), 0.0, 0.0])
+    rotations, root = high.rotations.copy(), high.root.copy()
+    rotations[40:, 0] = flat
+    root[40:, 1] = 0.12
+    falling = replace(high, root=root, rotations=rotations)
+    assert falls_from_above(falling.positions(), FPS)
+    lowest = add_support(falling).positions()[..., 1].min(axis=1)
+    assert np.abs(lowest[:35]).max() < 0.03
+    root[40:, 1] = 0.9
+    seated = replace(high, root=root, rotations=rotations)
+    assert not falls_from_above(seated.positions(), FPS)
+    assert not falls_from_above(high.positions(), FPS)
 
 
 def test_hands_come_out_of_the_floor() -> None:

@@ -111,6 +111,31 @@ def test_what_is_not_shown_is_generated_again(prior: Prior, monkeypatch: pytest.
     np.testing.assert_allclose(motions[1].motion.positions(), third.positions(), atol=1e-5)
 
 
+def test_the_mirror_image_is_looked_at_where_words_name_a_side(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What raises the other arm is mirrored, and sampled once; words without a side are not."""
+    sampled: list[Motion] = []
+    each = worded.generate_each
+
+    def keeping(*args, **more):
+        for place, motion in each(*args, **more):
+            sampled.append(motion)
+            yield place, motion
+
+    def missing(text: str, positions: np.ndarray, _) -> list[str]:
+        return ["a raised arm"] if np.array_equal(positions, sampled[-1].positions()) else []
+
+    monkeypatch.setattr(worded, "generate_each", keeping)
+    monkeypatch.setattr(worded, "missing", missing)
+    (one,) = worded.generate_worded(prior, "a person raises the left arm", seconds=1.0, steps=2, seed=7)
+    assert len(sampled) == 1
+    np.testing.assert_array_equal(one.motion.positions(), sampled[0].mirror().positions())
+    assert one.missing == []
+    worded.generate_worded(prior, "a person raises an arm", seconds=1.0, steps=2, seed=7)
+    assert len(sampled) == 1 + worded.ATTEMPTS
+    (kept,) = worded.generate_worded(prior, "a person raises the left arm", seconds=1.0, steps=2, seed=7, literal=True)
+    np.testing.assert_array_equal(kept.motion.positions(), sampled[-1].positions())
+
+
 def test_later_attempts_have_common_verbs_for_rare_ones(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[str] = []
 

@@ -87,7 +87,6 @@ class Amount:
 
 RADIUS = 1.0
 """Metres: of a half circle that is walked where its size is not said."""
-
 _UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
 _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
 _WAY = re.compile(
@@ -139,9 +138,10 @@ _MANY = re.compile(
 MOST_TIMES = 12
 _TRAVELS = re.compile(
     r"\b(?:forwards?|ahead|back|backwards?|over|across|along|towards?|around|onto|from|to|far|long|left|right|sideways"
-    r"|through|off|down the|up the|(?:run|walk|jog|skip|hop)\w*)\b"
+    r"|through|off|down the|up the|(?:run|walk|jog|skip)\w*)\b"
 )
-"""Words of jumps that go somewhere."""
+"""Words of jumps and hops that go somewhere."""
+_ON_ONE_LEG = re.compile(r"\b(?:on|with) (?:(?:the|his|her|their|its|your) )?(?:left|right) (?:foot|leg)\b")
 _SINGLE: dict[Counted, str] = {
     "jumps": "jump",
     "hops": "hop",
@@ -247,7 +247,7 @@ def _repetitions(phrase: str) -> Amount | None:
     if not 1 <= size <= MOST_TIMES or size != int(size):
         return None
     of = kinds.pop()
-    in_place = of == "jumps" and not _TRAVELS.search(phrase)
+    in_place = of in ("jumps", "hops") and not _TRAVELS.search(_ON_ONE_LEG.sub("", phrase))
     return Amount("count", size, _side(phrase) or "forward", of=of, in_place=in_place)
 
 
@@ -379,8 +379,6 @@ SLOWEST = 0.5
 """Share of the pace of the words that a way may be slowed to for a longer time; beyond it the person stands still."""
 TURN_OFF, WAY_OFF = 10.0, 0.1
 """Degrees (10 of a full turn), and share of a way, by which a motion may miss what was read."""
-
-
 STROKES: dict[Counted, float] = {
     "jumps": 1.5,
     "hops": 0.9,

@@ -22,6 +22,7 @@ from motionloom.kinematics.gestures import (
     oscillations,
     pelvis_height,
     seats,
+    single_foot_hops,
     torso_inclination,
     wrist_swings,
 )
@@ -197,6 +198,9 @@ def _repeated(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
                     count(what, p, fps, side=other) == 0
                 ),
             )
+    if limb and "hops" in countable_actions(phrase.text):
+        own, other_one = (0, 1) if limb == "left" else (1, 0)
+        yield f"hops on the {limb} foot", lambda p, fps: single_foot_hops(p)[own] > single_foot_hops(p)[other_one]
     if phrase.has(r"\b(?:clap|applau)"):
         yield "hands that meet", lambda p, fps: float(np.percentile(_between_hands(p), 3)) < 0.25
 

@@ -209,7 +209,8 @@ def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[S
     text, number = single_stroke(segment.text), int(amount.size)
     stroke, each = STROKES[amount.of] * share, segment.seconds / number
     if STROKES[amount.of] < CHAINED:
-        return (replace(segment, text=text, seconds=_in_whole_frames(min(segment.seconds, LONGEST) * share)),)
+        whole = _in_whole_frames(min(segment.seconds, LONGEST) * share)
+        return (replace(segment, text=text, seconds=whole, goal=goal_in_place(whole) if amount.in_place else None),)
     stroke = _in_whole_frames(min(stroke, each * share))
     between = min(TRANSITION, segment.transition, stroke / 2)
     goal = goal_in_place(stroke) if amount.in_place else None

@@ -48,6 +48,7 @@ TRIES = 6
 """Motions of which the best is kept where numbers are counted; `ATTEMPTS` where the words are plain without numbers."""
 _TOGETHER = 256
 """Motions that are sampled and looked at together."""
+_SIDED = re.compile(r"\b(?:left|right|(?:counter|anti)?-?clockwise)\b", re.IGNORECASE)
 STILL = 1.5
 ENDS_STILL, MOSTLY_STILL = 0.3, 0.8
 """Shares of a motion after which standing still at its end is reported: with unknown words, and with any."""
@@ -313,7 +314,7 @@ def _best_attempts(
         again = set(unseen)
         for place, motion in _unwatched(sampled) if number else sampled:
             i = unseen[place]
-            attempt = Worded(motion, words[i], (), attempts, timelines[i] if number else None)
+            attempt = _or_mirrored(Worded(motion, words[i], (), attempts, timelines[i] if number else None))
             if i not in best or len(attempt.missing) < len(best[i].missing):
                 best[i] = attempt
             if number + 1 == attempts or not best[i].missing:
@@ -359,12 +360,8 @@ def _best_try(
         own = replace(sampling, seed=attempt_seed(seed, number), first=0)
         motion = _sample_timeline(prior, now, own, foot_lock)
         candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said if number else None)
-        counted = [
-            one
-            for one, reading in zip(candidate.amounts, now.readings, strict=True)
-            if reading.amount.kind in ("count", "steps")
-        ]
-        off = sum(abs(one.asked - one.measured) for one in counted), len(candidate.missing)
+        candidate = _or_mirrored(candidate)
+        off = _missed(candidate)
         if best is None or off < least:
             best, least = candidate, off
         if not off[0] and (in_blocks or not off[1] or number + 1 >= attempts):
@@ -379,6 +376,27 @@ def _best_try(
         best = _blocks_again(best, Timed(prior, best.timeline.segments, None, own, foot_lock))
     several = len(timeline.segments) > 1
     return replace(best, motion=add_support(best.motion)) if several and foot_lock else best
+
+
+def _missed(one: Worded) -> tuple[float, int]:
+    """By how much its counts differ from those of the words, and how much else of the words it does not show."""
+    both = zip(one.amounts, one.timeline.readings, strict=True)
+    counted = [amount for amount, reading in both if reading.amount.kind in ("count", "steps")]
+    return sum(abs(amount.asked - amount.measured) for amount in counted), len(one.missing)
+
+
+def _or_mirrored(one: Worded) -> Worded:
+    """The motion, or its mirror image where that is nearer to words of one action that name a side.
+
+    A way, a turn and steps whose size is in the words have a goal, which knows the side.
+    """
+    texts = {segment.text for segment in one.timeline.segments}
+    has_goal = any(reading.amount.kind != "count" for reading in one.timeline.readings)
+    if one.attempts == 1 or has_goal or len(texts) > 1 or not _SIDED.search(min(texts)) or _missed(one) == (0, 0):
+        return one
+    motion = one.motion.mirror()
+    other = replace(one, motion=motion, amounts=_measure_amounts(one.timeline, motion))
+    return other if _missed(other) < _missed(one) else one
 
 
 def _blocks_again(one: Worded, timed: Timed) -> Worded:
