@@ -19,6 +19,7 @@ PATTERNS = {
     "often": amounts._OFTEN,
     "often_kept": amounts._OFTEN_OF_LIMBS,
     "many": amounts._MANY,
+    "counts_another": amounts._COUNTS_ANOTHER,
     "ages": amounts._AGES,
     "body": amounts._BODY,
     "held": amounts._HELD,

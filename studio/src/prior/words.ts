@@ -143,7 +143,7 @@ const oftenIn = (phrase: string): RegExpMatchArray[] => all("often", phrase.repl
 
 function repetitions(phrase: string): Amount | null {
   const [times, many] = [oftenIn(phrase), all("many", phrase)];
-  if (times.length + many.length !== 1 || /\b(?:while|every|per)\b/.test(phrase)) return null;
+  if (times.length + many.length !== 1 || first("counts_another", phrase)) return null;
   let kinds = (Object.entries(tables.counted) as [Counted, string][])
     .filter(([, words]) => new RegExp(`\\b(?:${words})\\b`).test(phrase))
     .map(([what]) => what);

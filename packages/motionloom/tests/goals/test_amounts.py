@@ -92,6 +92,10 @@ def test_numbers_with_units_are_read(text: str) -> None:
         ("turns around to face the other way", "a turn of 180 degrees to the left"),
         ("turn around to the right", "a turn of 180 degrees to the right"),
         ("she turns around the corner", "None"),
+        ("turns to the left", "a turn of 90 degrees to the left"),
+        ("he turns sharply right", "a turn of 90 degrees to the right"),
+        ("he turns right while walking", "None"),
+        ("she turns her head to the left", "None"),
         ("he turns around twice", "a turn of 720 degrees to the left"),
     ],
 )

@@ -59,13 +59,34 @@ PARTS = {
     "a person does a squat and returns to the starting position": [
         "a person does a squat and returns to the starting position"
     ],
+    "step into a lunge with the right foot, hold for three seconds, return to standing. Repeat on the left": [
+        "step into a lunge with the right foot",
+        "stand up",
+        "step into a lunge with the left foot",
+        "stand up",
+    ],
+    "reach your left arm over your head and lean to the right; hold for a count of eight, then the other side": [
+        "reach your left arm over your head",
+        "lean to the right",
+        "lean to the left",
+    ],
     # again and again
+    "raise your right arm, lower it, and repeat three times": ["raise your right arm", "lower your right arm"] * 3,
+    "Sit to stand from a chair without using the arms, four repetitions": ["sit down on a chair", "stand up"] * 4,
     "a person sits down and stands up three times": ["a person sits down", "a person stands up"] * 3,
     "he raises both arms, then lowers them, twice": ["he raises both arms", "he lowers both arms"] * 2,
     "leans left, then right, 2 reps": ["leans left", "leans right"] * 2,
     "hops on the right foot three times, then on the left three times": [
         "hops on the right foot three times",
         "hops on the left foot three times",
+    ],
+    # what comes before the action
+    "victory emote: waves, then bows": ["waves", "bows"],
+    "a hiker walks, stops to wipe the forehead and goes on": [
+        "a hiker walks",
+        "a hiker stops",
+        "a hiker wipes the forehead",
+        "a hiker goes on",
     ],
     # what was named last is no measure
     "he picks up a box, carries it a few steps and sets it down": [

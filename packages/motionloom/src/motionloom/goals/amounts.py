@@ -1,14 +1,13 @@
-"""Numbers with units in a sentence: how far, how many steps, how much of a turn, how long, how often.
+"""Numbers with units in a sentence: how far, how many steps, how much of a turn, how long, how often (docs/words.md).
 
 "turns left 90 degrees", "walks 3 meters forward", "takes three steps back", "walks in a half circle to the right",
-"for ten seconds", "jumps twice". What could mean something else, "a man of 25 years",
-"throws a ball 10 meters", is not read (docs/words.md).
+"for ten seconds", "jumps twice". Not what could mean something else, "a man of 25 years", "throws a ball 10 meters".
 """
 
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -59,7 +58,7 @@ class Amount:
 
     def __str__(self) -> str:
         if self.kind == "count":
-            return f"{self.size:g} {self.of if self.size > 1 else _SINGLE[self.of]}"  # type: ignore[index]
+            return f"{self.size:g} {self.of if self.size > 1 else _SINGLE[self.of or '']}"
         if self.kind == "turn":
             return f"a turn of {self.size:g} degrees to the {self.direction}"
         if self.kind == "arc":
@@ -100,6 +99,10 @@ _TURNS_ROUND = re.compile(
     r"(?= *$|[,.]| to (?:face|go|walk|run|the (?:left|right|other|opposite))| (?:again|\w+ly|once)\b)"
 )
 """A half turn, unless another size is said."""
+_TURNS_ASIDE = re.compile(
+    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:to )?(?:the |his |her |their |its |your )?(?:left|right) *$"
+)
+"""Between other actions a quarter turn."""
 _TURNS_OFTEN = re.compile(rf"\b{NUMBER} (?:full |complete |whole )?(?:turns|spins|pirouettes|rotations)\b")
 _ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi|full|complete|whole|0\.5)(?: of a)?[ -]?circles?\b")
 _CIRCLE = re.compile(r"\bin a (?:(?:(?:counter|anti)?[ -]?clockwise|small|tight|right|left|full) )*circle\b(?! of)")
@@ -135,6 +138,12 @@ _MANY = re.compile(
     r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|hooks?|uppercuts?"
     r"|bows?|claps?)\b"
 )
+_COUNTS_ANOTHER = re.compile(
+    r"\b(?:while|every|per|without (?:the |an? )?(?:jump|hop|kick|clap)\w*)\b"
+    rf"|^(?!.*\b(?:jump|hop|squat|kick|punch|bow|clap|leap|jab)\w*\b.* (?:{NUMBER} times|twice|thrice)\b)"
+    rf".*\b(?:{NUMBER} times|twice|thrice) and \w+"
+)
+"""Something else is counted: "pumps the fist three times and jumps"."""
 MOST_TIMES = 12
 _TRAVELS = re.compile(
     r"\b(?:forwards?|ahead|back|backwards?|over|across|along|towards?|around|onto|from|to|far|long|left|right|sideways"
@@ -142,16 +151,7 @@ _TRAVELS = re.compile(
 )
 """Words of jumps and hops that go somewhere."""
 _ON_ONE_LEG = re.compile(r"\b(?:on|with) (?:(?:the|his|her|their|its|your) )?(?:left|right) (?:foot|leg)\b")
-_SINGLE: dict[Counted, str] = {
-    "jumps": "jump",
-    "hops": "hop",
-    "squats": "squat",
-    "kicks": "kick",
-    "punches": "punch",
-    "bows": "bow",
-    "claps": "clap",
-    "jumping jacks": "jumping jack",
-}
+_SINGLE = {of: of.removesuffix("es" if of == "punches" else "s") for of in get_args(Counted)}
 _AGES = re.compile(rf"\b{NUMBER}[ -]?years?(?:[ -]old)?\b|\bof {NUMBER}\b(?! (?:steps|met))")
 _BODY = re.compile(
     r"\b(?:arms?|hands?|heads?|legs?|foot|knees?|wrists?|elbows?|hips?|waist|torso|shoulders?"
@@ -164,7 +164,7 @@ _ELSE = re.compile(
     r" (?:\w+ )?circle|around|dances?"
     r"|danc(?:e|ing)|ballet|salsa|waltz(?:es)?|tango|cha-cha|climb(?:s|ing)?|up (?:the |\w+"
     r" )?steps|down (?:the |\w+ )?steps"
-    r"|while|figure (?:of )?(?:eight|8)|pirouette|diagonally|apart|every)\b"
+    r"|in place|on the spot|while|figure (?:of )?(?:eight|8)|pirouette|diagonally|apart|every)\b"
 )
 """Words with which a number is no plain way: what is done then is left to the network."""
 _TURNS = {"turn", "rotate", "spin", "pivot", "twirl"}
@@ -238,7 +238,7 @@ def countable_actions(phrase: str) -> set[Counted]:
 def _repetitions(phrase: str) -> Amount | None:
     """Repetitions of one action whose strokes can be counted."""
     often, many = _OFTEN.findall(_OFTEN_OF_LIMBS.sub(" ", phrase)), list(_MANY.finditer(phrase))
-    if len(often) + len(many) != 1 or re.search(r"\b(?:while|every|per)\b", phrase):
+    if len(often) + len(many) != 1 or _COUNTS_ANOTHER.search(phrase):
         return None
     kinds = countable_actions(phrase)
     if len(kinds) != 1:
@@ -261,10 +261,11 @@ def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
     matches, part = list(_DEGREES.finditer(phrase)), _PART_OF_TURN.search(phrase)
     often = _TURNS_OFTEN.search(phrase) or _OFTEN.search(_OFTEN_OF_LIMBS.sub(" ", phrase))
     sizes = len(matches) + bool(part) + bool(often)
-    if sizes > 1 or not (sizes or (around and _TURNS_ROUND.search(phrase))):
+    aside = around and not sizes and _TURNS_ASIDE.search(phrase)
+    if sizes > 1 or not (sizes or aside or (around and _TURNS_ROUND.search(phrase))):
         return None
     if not sizes:
-        degrees = 180.0
+        degrees = 90.0 if aside else 180.0
     elif often:
         degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _repeat_count(often[1], often[2]))
     else:

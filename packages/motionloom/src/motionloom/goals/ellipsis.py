@@ -72,12 +72,15 @@ _UP_AGAIN = re.compile(
     re.IGNORECASE,
 )
 _BACK_AGAIN = re.compile(r"(walk|run|jog|come|go) back\b.*|return\b.*", re.IGNORECASE)
-_VESSEL = re.compile(r"\bfrom ((?:an?|the|his|her|their) (?:\w+ )?(?:bottle|glass|cup|mug|can|bowl))\b", re.IGNORECASE)
+_VESSEL = re.compile(
+    r"\bfrom ((?:an?|the|his|her|their|its|your|my) (?:\w+ )?(?:bottle|glass|cup|mug|can|bowl))\b", re.IGNORECASE
+)
 _OBJECT = re.compile(
     r"(?<!with )(?<!\bin )(?<!\bon )(?<!of )(?<!to )(?<!from )(?<!at )(?<!over )(?<!by )(?<=\w )"
-    r"((?:an?|the|his|her|their|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+"
+    r"((?:an?|the|his|her|their|its|your|my|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+"
     r"|something(?: heavy| light| big| small)?)"
-    r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again)\b)",
+    r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again"
+    r"|sideways|slowly)\b)",
     re.IGNORECASE,
 )
 """A thing that something is done with: what "it" and "them" mean behind it."""
@@ -86,7 +89,7 @@ _IT = re.compile(
     r"(?: back(?= (?:down|on|in|to)\b))?"
 )
 _NO_OBJECT = re.compile(
-    r"(?:the|his|her|their|an?|some|one) (?:few |couple of )?"
+    r"(?:the|his|her|their|its|your|my|an?|some|one) (?:few |couple of )?"
     r"(?:floor|ground|left|right|front|back|side|steps?|moments?|seconds?|while|bit|times?|met(?:er|re)s?|way)$",
     re.IGNORECASE,
 )
@@ -98,12 +101,15 @@ _GOES_AWAY = re.compile(
 )
 """What somebody does who has turned around to do it."""
 _SEATED = re.compile(r"\b(?:sits?|sat|seat)\b", re.IGNORECASE)
-_SITS = re.compile(r"(?:\w+ly )?sit(?: down)? with (?:(?:his|her|their) )?(?:legs crossed|crossed legs)", re.IGNORECASE)
+_SITS = re.compile(
+    r"(?:\w+ly )?sit(?: down)? with (?:(?:the|his|her|their|its|your|my) )?(?:legs crossed|crossed legs)", re.IGNORECASE
+)
 _SEATS = re.compile(r"\b(chair|bench|sofa|couch|stool|armchair|throne)\b")
 _CROUCHED = re.compile(r"\b(?:crouch|squat|kneel|duck)\w*|\bknelt\b", re.IGNORECASE)
 _ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
 _CYCLES = (
     (r"(?:\w+ly )?(?:sit|kneel|lie|crouch|squat|bend|get down|take a seat)\b", r".*\b(?:up|upright|standing)\b"),
+    (r".*\blunge\b", r"(?:\w+ly )?stand up\b"),
     (r"(?:raise|lift|put)\b", r"(?:\w+ly )?(?:lower|drop)\b|(?:put|bring|take)\b.*\bdown\b"),
     (r"(?:stand|get|rise)\b.*\bup\b|stand\b", r"(?:\w+ly )?(?:sit|kneel|lie|crouch)\b"),
 )
@@ -134,11 +140,49 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
         if _GOES_AWAY.match(in_base(rest)):
             result[-1] = _BARE_TURN.sub(r"\1 around", result[-1])
         before = result[-1]
-        if _only_ends(before, rest):
+        if again := _again(result, part):
+            result += again
+        elif _only_ends(before, rest):
             result[-1] = f"{before} and {rest}"
         else:
-            result.append(_with_repeated_words(before, part) or f"{named} {_rephrased(result[-_REACH:], rest)}".strip())
+            done = next((one for one in reversed(result) if not _stays(one)), before)
+            result.append(_with_repeated_words(done, part) or f"{named} {_rephrased(result[-_REACH:], rest)}".strip())
     return result
+
+
+def _again(parts: Sequence[str], part: str) -> list[str]:
+    """The action before, with its end if that is a part of its own, once more or on its other side; else empty."""
+    alone = re.sub(r"^(?:then|and) ", "", part.removeprefix(subject_of(parts[0])).strip().replace(",", ""))
+    again = _REPEATS.fullmatch(in_base(alone))
+    if not again:
+        return []
+    actions = [one for one in parts if not _stays(one)] or list(parts)
+    block = list(actions[-2:] if len(actions) > 1 and _are_reverse(actions[-2], actions[-1], _CYCLES) else actions[-1:])
+    side = (again["side"] or again["to"] or "").lower()
+    switched = side in ("other", "opposite") or bool(re.match("switch|change|swap", in_base(alone)) and not side)
+    if switched or (side in _OTHER and any(re.search(rf"\b{_OTHER[side]}\b", one) for one in block)):
+        block = [_mirrored(one) for one in block]
+    if not again["often"]:
+        return block
+    if len(block) == 1:
+        return [f"{_less(_OFTEN, block[0])} {again['often']}"]
+    return block * max(1, min(_times(again["often"]) - 1, _REACH // 2))
+
+
+def _stays(part: str) -> bool:
+    return bool(STAYS.match(in_base(part.removeprefix(subject_of(part)).strip())))
+
+
+def _are_reverse(part: str, other: str, cycles: Sequence[tuple[str, str]]) -> bool:
+    """Whether of two actions the second undoes the first."""
+    first, second = (in_base(one.removeprefix(subject_of(one)).strip()) for one in (part, other))
+    return any(re.match(one, first) and re.match(two, second) for one, two in cycles)
+
+
+def _times(often: str) -> int:
+    """The number that "twice" and "three times" say, up to 1,000."""
+    word = often.split(" ")[0].lower()
+    return {"once": 1, "twice": 2, "thrice": 3}.get(word) or int(re.sub(r"\D", "", in_digits(word))[:4] or 1)
 
 
 def repeat_cycles(parts: Sequence[str], most: int) -> list[str]:
@@ -147,18 +191,17 @@ def repeat_cycles(parts: Sequence[str], most: int) -> list[str]:
     parts: as of `resolve_ellipsis`, which this does too. most: how many may come of it. Empty where no two actions are
     each other's reverse, or too many would come of it.
     """
-    found = re.search(rf"(?:^|,? )({_OFTEN})$", parts[-1], re.IGNORECASE) if len(parts) > 1 else None
-    if not found:
+    found = re.search(rf"(?:^|,? )({_OFTEN})(?: each(?: \w+)?)?$", parts[-1], re.IGNORECASE) if len(parts) > 1 else None
+    if not found or _REPEATS.fullmatch(in_base(parts[-1].removeprefix(subject_of(parts[0])).strip())):
         return []
     resolved = resolve_ellipsis([*parts[:-1], parts[-1][: found.start()]])
-    first, second = ([""] + [in_base(part.removeprefix(subject_of(part)).strip()) for part in resolved])[-2:]
-    word = found[1].split(" ")[0].lower()
-    times = {"once": 1.0, "twice": 2.0, "thrice": 3.0}.get(word) or float(re.sub(r"\D", "", in_digits(word)) or 1)
     cycles = _CYCLES + _CYCLES_BEHIND_A_COMMA if "," in found[0] else _CYCLES
-    reverse = any(re.match(one, first) and re.match(other, second) for one, other in cycles)
-    if times < 2 or not reverse or re.search(rf"\b{_OFTEN}\b", first) or len(resolved) - 2 + 2 * times > most:
+    times = _times(found[1])
+    if times < 2 or len(resolved) < 2 or len(resolved) - 2 + 2 * times > most:
         return []
-    return [*resolved[:-2], *resolved[-2:] * int(times)]
+    first, second = resolved[-2:]
+    reverse = _are_reverse(first, second, cycles) and not re.search(rf"\b{_OFTEN}\b", first)
+    return [*resolved[:-2], *[first, second] * times] if reverse else []
 
 
 def _only_ends(before: str, rest: str) -> bool:
@@ -169,7 +212,7 @@ def _only_ends(before: str, rest: str) -> bool:
     if _COMES_UP.fullmatch(rest) and _BENT.search(before):
         return True
     if _RETURNS.fullmatch(rest):
-        return not _LOW.search(before) and not STAYS.match(in_base(before.removeprefix(subject_of(before)).strip()))
+        return not _LOW.search(before) and not _stays(before)
     if SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
         return True
     first = verb_of(before.removeprefix(subject_of(before)).strip(), mood_of(before))
@@ -183,11 +226,6 @@ def _with_repeated_words(before: str, part: str) -> str:
     not.
     """
     alone = re.sub(r"^(?:then|and) ", "", part.removeprefix(subject_of(before)).strip().replace(",", ""))
-    if again := _REPEATS.fullmatch(in_base(alone)):
-        side = (again["side"] or again["to"] or "").lower()
-        switched = side in ("other", "opposite") or bool(re.match("switch|change|swap", in_base(alone)) and not side)
-        other = _mirrored(before) if switched or re.search(rf"\b{_OTHER.get(side, ' ')}\b", before) else before
-        return f"{_less(_OFTEN, other)} {again['often']}" if again["often"] else other
     found = _ALONE.fullmatch(alone)
     if found and any(found.groupdict().values()):
         return _with_differences(before, alone, found)

@@ -47,6 +47,7 @@ _GOES, _PACE, _FAR = 0.6, 0.25, 1.25
 """Metres that somebody goes who goes anywhere, metres per second who goes on for longer, and the most that is asked."""
 _BRISK, _SLOW, _RUNS = 1.4, 1.0, 2.0
 """m/s above which a walk is fast, below which it is slow, that somebody reaches who runs."""
+_CURVES = np.radians(15)
 _TURNS, _TURNS_ROUND, _SPINS = np.radians(25), (np.radians(120), np.radians(240)), np.radians(300)
 _LOW, _DOWN, _UP = 0.85, 0.4, 0.85
 """Leg lengths of the pelvis over the feet: below it somebody crouches, kneels or sits; over the floor of somebody who
@@ -85,7 +86,7 @@ _WAY_BACK = (
 _NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
 _NO_THROW = (
     r"\b(?:punch|kick|jab|hook|uppercut)"
-    r"|\bthrow\w* (?:up )?(?:his|her|their|its|both|the) (?:\w+ )?(?:arm|hand|head)s?\b"
+    r"|\bthrow\w* (?:up )?(?:both|the|his|her|their|its|your|my) (?:\w+ )?(?:arm|hand|head)s?\b"
 )
 _TUMBLES = (
     r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
@@ -95,7 +96,7 @@ _SEAT = r"\b(?:chair|seat|bench|stool|sofa|couch)\b"
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
 _SIDE_BEND = (
     r"\b(?:lean|bend|tilt)(?:s|ing|ed)? (?:\w+ )?(?:sideways )?(?:over )?to(?:wards?)? "
-    r"(?<!head to )(?:the|his|her|their) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
+    r"(?<!head to )(?:the|his|her|their|its|your|my) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
 )
 _STANDS = (
     r"\b(?:rais|lift|wav|clap|point|nod|salut|cheer|drink|eat|look|cross|fold|stretch|shrug|talk|gestur|beckon|yawn|laugh"
@@ -207,6 +208,8 @@ def _repeated(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
 
 def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
     sign, turns = (1 if side == "left" else -1), phrase.has(r"\b(?:turn|pivot|rotat)") and not phrase.has(_NO_TURN)
+    if phrase.has(r"\bturn\w* (?:\w+ )?head\b"):
+        return
     if phrase.has(_NO_TURN):
         yield "facing one way", lambda p, fps: abs(turn(p)) < _FACES
     if phrase.has(r"\b(?:spin|twirl|pirouet)"):
@@ -232,6 +235,10 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         )
     elif _travels(phrase) and not turns and not phrase.has(_FALLS):
         yield _direction(phrase, side, sign)
+    if side and phrase.has(_GAIT) and phrase.has(r"\b(?:curv|veer|arc)"):
+        yield f"a curve to the {side}", lambda p, fps: sign * turn(p) > _CURVES
+    if side and phrase.has(_GAIT, r"\bdiagonal"):
+        yield f"a way aside to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES / 2
     yield from _paces(phrase)
 
 
@@ -280,10 +287,11 @@ def _postures(phrase: _Phrase) -> Iterator[_Named]:
     if phrase.has(r"\b(?:crouch|kneel|squat|duck)"):
         yield "going low", lambda p, fps: float(pelvis_height(p).min()) < _LOW
     if phrase.has(
-        r"\b(?:gets?|getting|stands?|standing|rises?) (?:back )?(?:up\b|on(?:to)? (?:the|his|her|their) feet)"
+        r"\b(?:gets?|getting|stands?|standing|rises?) (?:back )?"
+        r"(?:up\b|on(?:to)? (?:the|his|her|their|its|your|my) feet)"
     ):
         yield "standing at the end", lambda p, fps: float(pelvis_height(p)[-max(1, round(fps / 4)) :].mean()) > _UP
-    on_one_leg = r"\bon (?:one|(?:the |his |her |their )?(left|right)) (?:leg|foot)\b"
+    on_one_leg = r"\bon (?:one|(?:the |his |her |their |its |your |my )?(left|right)) (?:leg|foot)\b"
     if (match := re.search(on_one_leg, phrase.text)) and phrase.kinds <= {"state", "gesture", "other"}:
         lifted = [0, 1] if match[1] is None else [1] if match[1] == "left" else [0]
         yield "standing on one leg", lambda p, fps: any(_lasts(foot_lifts(p)[:, one] > 0.1, 1.0, fps) for one in lifted)
@@ -293,7 +301,8 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
     hands = {"": (0, 1), "left": (0,), "right": (1,)}[limb]
     rest = [hand for hand in (0, 1) if hand not in hands]
     if phrase.has(
-        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:\w+ ){0,4}(?:arm|hand)s?\b", r"rais|lift|\bup\b"
+        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:\w+ ){0,4}(?:arm|hand)s?\b",
+        r"rais|lift|\bup\b|over (?:\w+ )?head",
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
         joint = "spine3" if phrase.has(_LEVEL) else "neck"
@@ -316,14 +325,20 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a wave", lambda p, fps: max(wrist_swings(p, fps, amplitude=0.05)[hand] for hand in hands) >= 3
     if phrase.has(r"\b(?:cross|fold)\w* (?:\w+ )?arms\b|\barms (?:crossed|folded)\b|\bcrossed arms\b"):
         yield "crossed arms", lambda p, fps: _lasts(_hands_to_elbows(p) < _CROSSED, 0.3 * len(p) / fps, fps)
-    if phrase.has(r"\bhands? (?:to|on|over|against) (?:the|his|her|their) (?:forehead|head|face|eyes|ears?|brow)\b"):
+    if phrase.has(
+        r"\bhands? (?:to|on|over|against) (?:the|his|her|their|its|your|my) (?:forehead|head|face|eyes|ears?|brow)\b"
+    ):
         yield "a hand at the head", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
-    if phrase.has(r"\bhands? on (?:the |his |her |their )?(?:hips|waist)\b"):
+    if phrase.has(r"\bhands? on (?:the |his |her |their |its |your |my )?(?:hips|waist)\b"):
         yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
     if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(_NO_THROW):
         yield "a throw", lambda p, fps: _throws(_wrist_speed(p, fps).max(axis=0), hands)
     if phrase.has(r"(?<!\ba )(?<!\bthe )(?<!\bhis )(?<!\bher )\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
+    if phrase.has(r"\b(?:put|set|lay|place)\w* (?!up)(?:\w+ ){1,4}down\b(?! on an?\b| on the \w+)") and not phrase.has(
+        _LIMB
+    ):
+        yield "a hand near the floor", lambda p, fps: float(_hands_over_floor(p).min()) < _DOWN
     if phrase.has(
         r"\b(?:pick|grab|touch)",
         r"\b(?:floor|ground|bends?|bending|stoops?|(?:the|his|her|their|its|your|my) (?:toes|feet))\b",
@@ -338,7 +353,7 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
         yield "standing upright", _stands
     if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
-    if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b"):
+    if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b|\bhands on (?:\w+ )?knees\b"):
         yield "a bend", lambda p, fps: _lasts(torso_inclination(p) > _BENDS, 0.2, fps)
     if bent := re.search(_SIDE_BEND, phrase.text):
         sign = 1 if bent[1] == "left" else -1

@@ -56,6 +56,16 @@ _NO_SEPARATOR = re.compile(
 _SIDESTEPS = re.compile(
     r"(^|\b(?:person|man|woman|figure|someone|somebody|he|she|they|it|and|then)) ?side[ -]steps\b", re.I
 )
+_LABEL = re.compile(r"^[A-Za-z][\w -]{2,30}: +(?=\w)")
+_SIT_TO_STAND = re.compile(
+    r"\bsit[ -]to[ -]stands?\b(?: from (?:an?|the) (?:\w+ )?chair)?"
+    r"(?:,? without (?:using )?(?:the|your|his|her) (?:arms|hands))?",
+    re.IGNORECASE,
+)
+_STOPS_TO = re.compile(
+    rf"\b(stops|stop|stopped) to ({'|'.join(sorted(MOODS['base'], key=len, reverse=True))})\b", re.IGNORECASE
+)
+_FINISHES = re.compile(r"\b(?:finish|end)(es|s|ing)? with(?= an? )", re.IGNORECASE)
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
 _SUBORDINATE = re.compile(
@@ -78,11 +88,13 @@ _LASTS = re.compile(
 _POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch": "crouch", "squat": "crouch"}
 """Verbs of who ends up low, and of who is: the weights know nobody who stays in a squat."""
 _DOWN = re.compile(r"take a seat\b.*|(?:drop|go|get|sink|fall|take) (?:(?!up |off )\w+ ){0,3}knees?\b.*", re.IGNORECASE)
-_WHERE_LOW = re.compile(r"\bon (?:the|his|her|their|its) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE)
+_WHERE_LOW = re.compile(
+    r"\bon (?:the|his|her|their|its|your|my) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE
+)
 
 _HEAD_OR_HANDS = re.compile(
     r"(?:puts?|putting|places?|placing|drops?|buries) "
-    r"(?:his|her|their|its|the|both) (?:head|face|chin|hands?|arms?|feet)\b"
+    r"(?:the|his|her|their|its|your|my|both) (?:head|face|chin|hands?|arms?|feet)\b"
 )
 _TOGETHER = (
     (
@@ -103,7 +115,7 @@ def split_actions(text: str) -> tuple[Part, ...]:
     One part, the text as it is, where the sentence says one thing or things at once; at most `MOST_PARTS`, else it is
     left whole too.
     """
-    whole = _SIDESTEPS.sub(r"\1 sidesteps", " ".join(text.split()).rstrip(" .;,"))
+    whole = _prepared(" ".join(text.split()).rstrip(" .;,"))
     clauses = [clause for sentence in _split_by_time(whole) for clause in _split_by_then(sentence)]
     if len(clauses) > 1:
         clauses[0] = re.sub(r"^first,? (?=\w+ \w)|,? first$", "", clauses[0], flags=re.IGNORECASE)
@@ -138,6 +150,19 @@ def split_actions(text: str) -> tuple[Part, ...]:
         ]
     rested = _merge_rests([Part(*both) for both in zip(_keep_postures(parts), seconds, strict=True)])
     return tuple(rested) if len(rested) > 1 else (Part(text, rested[0].seconds),)
+
+
+def _prepared(text: str) -> str:
+    """The text without a label before it ("victory emote: ..."), and with verbs for what only sounds like nouns."""
+    text = _SIDESTEPS.sub(r"\1 sidesteps", _LABEL.sub("", text))
+    text = _SIT_TO_STAND.sub("sit down on a chair and stand up", text)
+    text = _STOPS_TO.sub(lambda match: f"{match[1]}, {_form_as(match[1], match[2])}", text)
+    return _FINISHES.sub(lambda match: {"": "do", "es": "does", "s": "does", "ing": "doing"}[match[1] or ""], text)
+
+
+def _form_as(stops: str, base: str) -> str:
+    """The verb in the form of "stops", "stop" or "stopped"."""
+    return form_of(base, mood_of(stops) or "third")
 
 
 def _merge_rests(parts: Sequence[Part]) -> list[Part]:
