@@ -95,7 +95,7 @@ _WAY = re.compile(
 _DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
 _PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
 _TURNS_ROUND = re.compile(
-    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:around|round|about)"
+    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:around|round|about|back)"
     r"(?= *$|[,.]| to (?:face|go|walk|run|the (?:left|right|other|opposite))| (?:again|\w+ly|once)\b)"
 )
 """A half turn, unless another size is said."""
