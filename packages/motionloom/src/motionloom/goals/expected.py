@@ -350,7 +350,7 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
     if phrase.has(_TUMBLES):
         yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
     if phrase.has(_STANDS) and phrase.kinds <= {"gesture", "state"} and not phrase.has(_NOT_STANDING):
-        yield "standing upright", _stands
+        yield "standing upright", _is_upright
     if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
     if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b|\bhands on (?:\w+ )?knees\b"):
@@ -383,8 +383,8 @@ def _sideways(p: Array) -> Array:
     return np.arctan2(trunk[:, 0], trunk[:, 1])
 
 
-def _stands(p: Array, fps: float) -> bool:
-    """Whether somebody stands upright in one place."""
+def _is_upright(p: Array, fps: float) -> bool:
+    """Whether somebody stands upright in one place: (frames, 22, 3) metres."""
     upright = float(np.median(torso_inclination(p))) < _UPRIGHT / 2 and float(pelvis_height(p).min()) > _LOW - 0.05
     leaps = float(p[:, 0, 1].max() - np.median(p[: max(1, round(fps / 4)), 0, 1])) > _LEAPS
     return upright and not leaps and float(np.hypot(*_from_start(p).T).max()) < 1.0
