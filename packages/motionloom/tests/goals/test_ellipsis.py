@@ -70,6 +70,11 @@ PARTS = {
         "lean to the right",
         "lean to the left",
     ],
+    "Lunge forward with the left leg, hold for two seconds, and return; repeat three times": [
+        "Lunge forward with the left leg",
+        "stand up",
+    ]
+    * 3,
     # again and again
     "raise your right arm, lower it, and repeat three times": ["raise your right arm", "lower your right arm"] * 3,
     "Sit to stand from a chair without using the arms, four repetitions": ["sit down on a chair", "stand up"] * 4,

@@ -46,6 +46,7 @@ from motionloom.goals.verbs import MOODS, PLAINER, base_of, in_plainer_words, ki
         ("a soldier falls backward", "a soldier falls backwards and lies there"),
         ("he stumbles and falls to the ground", "he stumbles and falls down and lies there"),
         ("she fell flat on her face", "she collapsed slowly forward"),
+        ("swaying and nearly falling over", "swaying and nearly falling over"),
         ("he almost falls, then falls asleep", "he almost falls, then lies down"),
         ("a man drops to the floor", "a man falls down and lies there"),
         ("he drops to one knee", "he kneels down"),

@@ -211,8 +211,10 @@ def _only_ends(before: str, rest: str) -> bool:
         return not _SEATED.search(before)
     if _COMES_UP.fullmatch(rest) and _BENT.search(before):
         return True
+    if _stays(before):
+        return False
     if _RETURNS.fullmatch(rest):
-        return not _LOW.search(before) and not _stays(before)
+        return not _LOW.search(before)
     if SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
         return True
     first = verb_of(before.removeprefix(subject_of(before)).strip(), mood_of(before))
@@ -282,7 +284,10 @@ def _rephrased(parts: Sequence[str], rest: str) -> str:
     mood, before, plain = mood_of(rest) or "third", parts[-1], in_base(rest)
     if re.fullmatch(r"(?:\w+ly )?sit (?:back )?up(?: again| straight)?", plain) and _LIES.search(before):
         return f"{form_of('sit', mood)} on the floor"
-    if _RETURNS.fullmatch(plain):
+    low = next((one for one in reversed(parts) if not _stays(one)), before)
+    if _RETURNS.fullmatch(plain) or (
+        plain == "return" and (SQUATS.search(low) or _BENT.search(low) or _LOW.search(low))
+    ):
         return f"{form_of('stand', mood)} up"
     back = _BACK_AGAIN.fullmatch(plain)
     if back and (on := re.fullmatch(r"\w+ back (up|down)", plain)) and any(map(_STAIRS.search, parts)):

@@ -47,7 +47,7 @@ _GOES, _PACE, _FAR = 0.6, 0.25, 1.25
 """Metres that somebody goes who goes anywhere, metres per second who goes on for longer, and the most that is asked."""
 _BRISK, _SLOW, _RUNS = 1.4, 1.0, 2.0
 """m/s above which a walk is fast, below which it is slow, that somebody reaches who runs."""
-_CURVES = np.radians(15)
+_CURVES, _CIRCLES = np.radians(15), np.radians(270)
 _TURNS, _TURNS_ROUND, _SPINS = np.radians(25), (np.radians(120), np.radians(240)), np.radians(300)
 _LOW, _DOWN, _UP = 0.85, 0.4, 0.85
 """Leg lengths of the pelvis over the feet: below it somebody crouches, kneels or sits; over the floor of somebody who
@@ -235,6 +235,8 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         )
     elif _travels(phrase) and not turns and not phrase.has(_FALLS):
         yield _direction(phrase, side, sign)
+    if phrase.has(_GAIT, r"\bin an? (?:[\w-]+ ){0,2}circle\b"):
+        yield "a circle", lambda p, fps: abs(turn(p)) > _CIRCLES and (not side or sign * turn(p) > 0)
     if side and phrase.has(_GAIT) and phrase.has(r"\b(?:curv|veer|arc)"):
         yield f"a curve to the {side}", lambda p, fps: sign * turn(p) > _CURVES
     if side and phrase.has(_GAIT, r"\bdiagonal"):

@@ -144,10 +144,9 @@ def split_actions(text: str) -> tuple[Part, ...]:
         return (Part(text, natural_seconds(text)),)
     last = len(parts) - 1
     seconds = [_part_seconds(part) if i < last else natural_seconds(part) for i, part in enumerate(parts)]
-    if cycles:  # who does so again and again holds nothing
-        seconds = [
-            _AGAIN * one if kind_of(part, mood_of(part)) == "gesture" else one for part, one in zip(parts, seconds)
-        ]
+    for i, part in enumerate(parts):  # who does so again and again holds nothing
+        if (cycles or parts.count(part) > 2) and kind_of(part, mood_of(part)) == "gesture":
+            seconds[i] *= _AGAIN
     rested = _merge_rests([Part(*both) for both in zip(_keep_postures(parts), seconds, strict=True)])
     return tuple(rested) if len(rested) > 1 else (Part(text, rested[0].seconds),)
 
