@@ -242,7 +242,10 @@ def test_no_part_is_left_without_time(natural: list[float], seconds: float) -> N
     assert min(seconds_each) >= min(SHORTEST, seconds / len(parts)) - 0.051
 
 
-WORDS = "a person walks sits down and then , before after sitting waves . ; while turn 3 times"
+WORDS = (
+    "a person walks sits down and then , before after sitting waves . ; while turn 3 times twice left right the other on"
+    " leg repeat switches raises lowers arm it hold for seconds return to standing up again back forward lunge circle"
+)
 words = st.lists(st.sampled_from(WORDS.split()), max_size=12)
 
 

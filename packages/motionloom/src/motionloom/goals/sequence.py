@@ -169,10 +169,9 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
     result: list[Part] = []
     for part in parts:
         rest = part.text.removeprefix(subject_of(part.text)).strip()
-        before = _first_verb(result[-1].text) if result else "walk"
-        if (_LASTS.match(rest) and before in _POSTURES) or (
-            STAYS.match(in_base(rest)) and (before not in WALKS or SQUATS.search(result[-1].text))
-        ):
+        before = _first_verb(result[-1].text) if result else ""
+        moves = before in WALKS and not SQUATS.search(result[-1].text) if result else True
+        if (_LASTS.match(rest) and before in _POSTURES) or (STAYS.match(in_base(rest)) and not moves):
             both = result[-1].seconds + part.seconds
             result[-1] = Part(result[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
         else:
