@@ -243,8 +243,8 @@ def test_no_part_is_left_without_time(natural: list[float], seconds: float) -> N
 
 
 WORDS = (
-    "a person walks sits down and then , before after sitting waves . ; while turn 3 times twice left right the other on"
-    " leg repeat switches raises lowers arm it hold for seconds return to standing up again back forward lunge circle"
+    "a person walks sits down and then , before after sitting waves . ; while turn 3 times twice left right the other"
+    " on leg repeat switches raises lowers arm it hold for seconds return to standing up again back forward lunge"
 )
 words = st.lists(st.sampled_from(WORDS.split()), max_size=12)
 
