@@ -54,8 +54,8 @@ def run_compose(arguments: Namespace) -> int:
         return 0
 
     check_loop(arguments, timeline.seconds)
-    check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
     prior = load_prior(arguments)
+    check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
     timeline = replace(timeline, segments=load_segment_adapters(prior, timeline.segments))
     streams = _open(arguments, outs, timeline, target)

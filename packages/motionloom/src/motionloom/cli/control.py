@@ -56,8 +56,8 @@ def run_control(arguments: Namespace) -> int:
     if arguments.loop:
         check_loop(arguments, len(goal.positions) / FPS)
         note_loop(arguments, "goals there are not kept")
-    check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
+    check_overwriting(arguments, [file for several in files for file in several])
     remarks = remark_unknown(prior, [arguments.prompt])
     output = finished_motions(files, [arguments.prompt] * arguments.count, target, arguments.fps)
     values, judged = request_of(arguments, Control, {"goals": goal}), []

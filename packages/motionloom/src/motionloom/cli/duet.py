@@ -55,7 +55,6 @@ def run_duet(arguments: Namespace) -> int:
     _check(arguments)
     outs, target = check_pair_outs(arguments)
     files = places(outs, arguments.count, target, sheets=False)
-    check_overwriting(arguments, [file for several in files for file in several])
     metre = target.metre
     timeline = _timeline(arguments, metre) if arguments.timeline else None
     goals = _goals(arguments, metre)
@@ -65,6 +64,7 @@ def run_duet(arguments: Namespace) -> int:
     _check_sizes(arguments, files, people, timeline)
     prior = load_prior(arguments)
     block = PairBlock.load(arguments.pair_weights, prior)
+    check_overwriting(arguments, [file for several in files for file in several])
     words = remarks_on_words(prior, _texts(arguments, timeline), block=block)
     remarks = _printed([one.line for one in words])
     caption = _caption(arguments, timeline)

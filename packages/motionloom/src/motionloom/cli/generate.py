@@ -53,8 +53,8 @@ def run_generate(arguments: Namespace) -> int:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
     files = places(outs, len(captions), target)
-    check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
+    check_overwriting(arguments, [file for several in files for file in several])
     timelines = {prompt: _timeline(arguments, prior, prompt, target.metre) for prompt in prompts}
     for timeline in timelines.values():
         check_loop(arguments, timeline.seconds)

@@ -224,13 +224,11 @@ def _only_ends(before: str, rest: str) -> bool:
 
 
 def _with_repeated_words(before: str, part: str) -> str:
-    """The sentence before with what the part says differently: another side, thing, number or way; empty if it does
-    not.
-    """
+    """The sentence before with what the part says differently: a side, a thing, a number, a way; else empty."""
     alone = re.sub(r"^(?:then|and) ", "", part.removeprefix(subject_of(before)).strip().replace(",", ""))
     found = _ALONE.fullmatch(alone)
     if found and any(found.groupdict().values()):
-        return _with_differences(before, alone, found)
+        return _with_differences(before, found)
     if _THING_ALONE.fullmatch(alone) and not any(base_of(word) in NOUNS_AFTER for word in alone.split(" ")):
         ends = [match.end() for match in re.finditer(r"[a-z]+", before) if base_of(match[0]) in NOUNS_AFTER]
         if ends:
@@ -238,7 +236,7 @@ def _with_repeated_words(before: str, part: str) -> str:
     return ""
 
 
-def _with_differences(before: str, alone: str, found: re.Match[str]) -> str:
+def _with_differences(before: str, found: re.Match[str]) -> str:
     """The sentence with the side, the way, the pace and the number that the words name alone."""
     side, where, often = (found["side"] or "").lower(), found["where"], found["often"] or found["later"]
     if found["number"]:
@@ -316,4 +314,5 @@ def in_base(rest: str) -> str:
 
 
 def form_of(base: str, mood: str) -> str:
+    """The form of a verb in a mood: "sits" of "sit" in "third"."""
     return next(form for form, of in MOODS[mood].items() if of == base)
