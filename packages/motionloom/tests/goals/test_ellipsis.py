@@ -87,6 +87,8 @@ PARTS = {
     ],
     # what comes before the action
     "victory emote: waves, then bows": ["waves", "bows"],
+    "she spins, then finishes with a curtsy": ["she spins", "she does a curtsy"],
+    "he walks, then waves at the end with a smile": ["he walks", "he waves at the end with a smile"],
     "a hiker walks, stops to wipe the forehead and goes on": [
         "a hiker walks",
         "a hiker stops",

@@ -47,7 +47,7 @@ _ENDS = re.compile(
 )
 """The end of bowing, bending, ducking."""
 _BENT = re.compile(r"\b(?:bend|bow|duck|stoop|squat)|\btouch\w* (?:\w+ )?toes\b", re.IGNORECASE)
-_COMES_UP = re.compile(r"(?:slowly )?(?:come|go) (?:slowly )?up(?: slowly)?", re.IGNORECASE)
+_STRAIGHTENS = re.compile(r"(?:slowly )?(?:come|go) (?:slowly )?up(?: slowly)?", re.IGNORECASE)
 _RETURNS = re.compile(
     r"(?:slowly )?(?:return|come back|go back|get back|roll up)(?: slowly| back)* (?:in)?to "
     r"(?:(?:an?|the|his|her|their|your) )?"
@@ -113,13 +113,14 @@ _CYCLES = (
     (r"(?:raise|lift|put)\b", r"(?:\w+ly )?(?:lower|drop)\b|(?:put|bring|take)\b.*\bdown\b"),
     (r"(?:stand|get|rise)\b.*\bup\b|stand\b", r"(?:\w+ly )?(?:sit|kneel|lie|crouch)\b"),
 )
+"""Patterns of two actions of which the second undoes the first, verbs in their bases."""
 _CYCLES_BEHIND_A_COMMA = (
     (r".*\bforwards?\b", r".*\bback(?:wards?)?\b"),
     (r".*\bup\b", r".*\bdown\b"),
     (r".*\bleft\b", r".*\bright\b"),
     (r".*\bright\b", r".*\bleft\b"),
 )
-"""Patterns of two actions that follow each other again and again, verbs in their bases."""
+"""Those of which both are done again only where a comma is before the number: "left, then right, twice"."""
 _OTHER = {"left": "right", "right": "left"}
 _REACH = 20
 """Parts that words may refer back over."""
@@ -209,7 +210,7 @@ def _only_ends(before: str, rest: str) -> bool:
     rest = in_base(rest)
     if _ENDS.fullmatch(rest):
         return not _SEATED.search(before)
-    if _COMES_UP.fullmatch(rest) and _BENT.search(before):
+    if _STRAIGHTENS.fullmatch(rest) and _BENT.search(before):
         return True
     if _stays(before):
         return False

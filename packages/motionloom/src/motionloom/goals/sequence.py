@@ -65,7 +65,7 @@ _SIT_TO_STAND = re.compile(
 _STOPS_TO = re.compile(
     rf"\b(stops|stop|stopped) to ({'|'.join(sorted(MOODS['base'], key=len, reverse=True))})\b", re.IGNORECASE
 )
-_FINISHES = re.compile(r"\b(?:finish|end)(es|s|ing)? with(?= an? )", re.IGNORECASE)
+_FINISHES = re.compile(r"(?<!\bthe )\b(?:finish|end)(es|s|ing)? with(?= an? )", re.IGNORECASE)
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
 _SUBORDINATE = re.compile(
