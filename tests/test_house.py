@@ -36,7 +36,7 @@ BUDGETS = {
     "live": 2_919,
     "blender/(top)": 2_786,
     "robots": 2_657,
-    "kinematics": 2_642,
+    "kinematics": 2_644,
     "viz": 2_287,
     "edits": 2_117,
     "runtime": 1_970,

@@ -66,6 +66,9 @@ def test_who_falls_from_above_the_floor_stood_on_it() -> None:
     assert falls_from_above(falling.positions(), FPS)
     lowest = add_support(falling).positions()[..., 1].min(axis=1)
     assert np.abs(lowest[:35]).max() < 0.03
+    up_again = np.concatenate([root, high.root[:20] + np.array([0.0, 0.1, 0.0])])
+    rises = replace(high, root=up_again, rotations=np.concatenate([rotations, high.rotations[:20]]))
+    assert falls_from_above(rises.positions(), FPS)
     root[40:, 1] = 0.9
     seated = replace(high, root=root, rotations=rotations)
     assert not falls_from_above(seated.positions(), FPS)

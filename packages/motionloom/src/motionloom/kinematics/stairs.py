@@ -135,9 +135,11 @@ def falls_from_above(positions: np.ndarray, fps: float) -> bool:
     """
     p = np.asarray(positions, dtype=np.float64)
     begins = float(np.median(_lowest(p)[: max(1, round(fps / 2))]))
-    above = [hold.height for hold in footholds(p, fps) if hold.height > UP]
-    on_one_level = bool(above) and max(abs(height - begins) for height in above) < _ONE_LEVEL
-    return begins > UP and on_one_level and float(p[:, 0, 1].min()) < _ON_THE_FLOOR * leg_length(p)
+    down = p[:, 0, 1] < _ON_THE_FLOOR * leg_length(p)
+    if begins <= UP or not down.any():
+        return False
+    before = [hold for hold in footholds(p[: int(down.argmax())], fps) if hold.end - hold.first > fps / 4]
+    return bool(before) and all(abs(hold.height - begins) < _ONE_LEVEL for hold in before)
 
 
 def _lasting(flags: np.ndarray, fps: float) -> list[tuple[int, int]]:
