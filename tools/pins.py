@@ -1,11 +1,12 @@
 """Renew the pins: exact versions and hashes of all that `make` installs. Run as ``make pins``.
 
 uv resolves pyproject.toml for CPython 3.11 on Linux and writes the hashes that the package index states, for every
-platform's files. Four files come of it, which pip takes with ``--require-hashes``:
+platform's files. Five files come of it, which pip takes with ``--require-hashes``:
 
 constraints.txt          what tests and checks need, the runtime's packages among them
 constraints-runtime.txt  what `make demo` needs
 constraints-cuda.txt     CUDA's own libraries, which only a CUDA build of torch wants
+constraints-studio.txt   what `make studio` needs beside constraints-runtime.txt
 constraints-robots.txt   what the extra `robots` needs beside constraints.txt
 
 PyTorch also ships builds outside of the index (``2.13.0+cpu``), with other hashes. Those that this machine's pip would
@@ -28,6 +29,7 @@ WHAT = {
     "constraints.txt": "all that tests and checks need, the runtime's packages too (Linux, CPython 3.11)",
     "constraints-runtime.txt": "all that `make demo` installs (Linux, CPython 3.11)",
     "constraints-cuda.txt": "CUDA's libraries, for a CUDA build of torch (Linux, CPython 3.11)",
+    "constraints-studio.txt": "all that `make studio` installs beside constraints-runtime.txt (Linux, CPython 3.11)",
     "constraints-robots.txt": "all that robots need beside constraints.txt (Linux, CPython 3.11)",
 }
 BUILD = "setuptools>=77\n"
@@ -107,9 +109,11 @@ def main() -> int:
         limits = Path(place) / "limits.txt"
         limits.write_text("".join(f"{lines[0]}\n" for lines in everything.values()))
         runtime = resolved(["film"], limits, upgrade=upgrade)
+        studio = resolved(["studio"], limits, upgrade=upgrade)
         robots = resolved(["robots"], limits, upgrade=upgrade)
     write("constraints.txt", {name: lines for name, lines in everything.items() if not CUDA.match(name)})
     write("constraints-runtime.txt", {name: everything[name] for name in runtime if not CUDA.match(name)})
+    write("constraints-studio.txt", {name: everything[name] for name in studio if name not in runtime})
     write("constraints-cuda.txt", {name: lines for name, lines in everything.items() if CUDA.match(name)})
     write("constraints-robots.txt", {name: lines for name, lines in robots.items() if name not in everything})
     return 0

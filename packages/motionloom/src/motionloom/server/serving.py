@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import uvicorn
+import websockets  # noqa: F401  uvicorn does without, and answers live sessions with 404 then
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 
