@@ -58,7 +58,7 @@ def closure(requirements: Iterable[str]) -> set[str]:
 
 def environment(folder: Path, names: Iterable[str]) -> str:
     """A path for Python on which only the packages of these names are, and the sources."""
-    for name in names:
+    for name in {*names, "motionloom"}:  # of the last only what says its version
         found = installed(name)
         for top in {path.parts[0] for path in found.files or () if path.parts[0] != ".."}:
             link = folder / top
