@@ -40,6 +40,8 @@ export interface LiveState {
   readonly goal: Ground | null;
 }
 
+const UNWELCOME = "The server does not answer in live mode. Look at what it printed, and start it again.";
+
 const BEGUN: LiveState = { connected: false, words: "", seconds: 0, problem: "", goal: null };
 
 export class Live {
@@ -143,7 +145,7 @@ export class Live {
       case "error":
         return this.change({ problem: message.message });
       case "closed":
-        return this.change({ connected: false });
+        return this.change({ connected: false, problem: message.refused ? UNWELCOME : "" });
     }
   }
 

@@ -26,14 +26,17 @@ export type LiveMessage =
   | LiveFrame
   | { readonly type: "health"; readonly problem: string }
   | { readonly type: "error"; readonly message: string; readonly last?: boolean }
-  | { readonly type: "closed" };
+  | { readonly type: "closed"; readonly refused: boolean };
 
 const AGAIN = 1000;
+/** Connections in a row that the server did not welcome, after which it is said that it has no live mode. */
+const REFUSED = 2;
 
 export class LiveClient {
   private socket: WebSocket | null = null;
   private hello: Record<string, unknown>;
   private over = false;
+  private unwelcome = 0;
 
   /** `each` is called with every message of the server, and with `closed` when the connection is lost. */
   constructor(
@@ -60,7 +63,8 @@ export class LiveClient {
     this.socket.onmessage = (event) => this.take(JSON.parse(String(event.data)) as LiveMessage);
     this.socket.onclose = () => {
       if (this.over) return;
-      this.each({ type: "closed" });
+      this.unwelcome += 1;
+      this.each({ type: "closed", refused: this.unwelcome >= REFUSED });
       setTimeout(() => this.over || this.open(), AGAIN);
     };
   }
@@ -68,7 +72,10 @@ export class LiveClient {
   /** The session is gone on with where the connection was lost, if the server still knows it. */
   private take(message: LiveMessage): void {
     if (this.over) return;
-    if (message.type === "welcome") this.hello = { session: message.session };
+    if (message.type === "welcome") {
+      this.hello = { session: message.session };
+      this.unwelcome = 0;
+    }
     if (message.type === "error" && message.last) this.hello = this.begin;
     this.each(message);
   }

@@ -83,3 +83,14 @@ def test_the_stick_of_a_gamepad_steers(studio: Studio):
     assert across[-20:].mean() > 0.6, "and then to the right of the picture"
     assert across[-20:].mean() > 3 * abs(along[-20:].mean())
     assert not studio.faults
+
+
+@pytest.mark.slow
+def test_a_server_that_has_no_live_mode_is_said_on_the_page(studio: Studio):
+    studio.page.evaluate(
+        "window.WebSocket = class extends WebSocket { constructor(place) { super(place.replace('/live', '/none')) } }"
+    )
+    studio.key("j")
+    studio.until("document.querySelector('#live p.unmet')?.textContent.includes('does not answer')")
+    studio.key("Escape")
+    studio.page.wait_for_selector("#live", state="hidden")
