@@ -9,9 +9,9 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features import pair as two
 from motionloom.io import save
 from motionloom.kinematics import physics as ph
+from motionloom.kinematics import shared_world
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.skeleton import HUMANML_BONE_LENGTHS
 from motionloom_lab.metrics import pair as mp
@@ -172,7 +172,7 @@ def test_people_of_other_legs_keep_their_distances_up_to_one_factor():
     uniform = [hml.uniform(person) for person in large]
     own = float(sum(HUMANML_BONE_LENGTHS[j] for j in (4, 7)))
     legs = [1.2 * own, 0.8 * own]
-    together = two.one_world(uniform, legs)
+    together = shared_world.one_world(uniform, legs)
     before = np.linalg.norm((large[1] - large[0])[:, 0, [0, 2]], axis=-1)
     np.testing.assert_allclose(mp.distance(together), before, rtol=5e-3)  # the mean leg is the uniform one
     apart = mp.distance(np.stack(uniform))
@@ -182,13 +182,13 @@ def test_people_of_other_legs_keep_their_distances_up_to_one_factor():
 
 def test_people_of_equal_legs_are_not_moved():
     pair = walkers()
-    np.testing.assert_array_equal(two.one_world(list(pair), [0.7, 0.7]), pair)
+    np.testing.assert_array_equal(shared_world.one_world(list(pair), [0.7, 0.7]), pair)
 
 
 def test_a_pair_on_another_place_of_the_world_is_the_same_pair():
     pair = walkers() * np.array([1.1, 0.9])[:, None, None, None]
     there = pair + np.array([30.0, 0.0, -20.0])
-    first, second = (two.one_world([hml.uniform(p) for p in both], [1.1, 0.9]) for both in (pair, there))
+    first, second = (shared_world.one_world([hml.uniform(p) for p in both], [1.1, 0.9]) for both in (pair, there))
     np.testing.assert_allclose(mp.distance(first), mp.distance(second), atol=0.01)
 
 

@@ -37,3 +37,9 @@ def cross(a: Numbers, b: Numbers) -> Numbers:
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return stack(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+
+
+def true_spans(mask: np.ndarray | np.bool_) -> list[tuple[int, int]]:
+    """Half-open ranges (first, end) of consecutive True in flags (frames,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -178,6 +178,13 @@ class Motion:
         return Motion(self.skeleton, self.fps, self.root * flip, turned, moved)
 
 
+def local_rotations(skeleton: Skeleton, world: Array) -> Array:
+    """World orientations (frames, joints, 4) to each joint's in its parent's frame, without sign flips in time."""
+    local, parents = world.copy(), list(skeleton.parents[1:])
+    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
+    return rot.unroll(rot.normalize(local))
+
+
 def heading(positions: np.ndarray) -> Array:
     """Where a person faces, square to the hips and shoulders.
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from motionloom.arrays import true_spans
 from motionloom.edits.stances import FAR, carried, stilled
-from motionloom.kinematics.gestures import true_spans
 
 RNG = np.random.default_rng(0)
 FRAMES = 60

@@ -247,7 +247,7 @@ def second(*_: Any, **__: Any) -> int:
 
 @pytest.fixture
 def second_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionloom.tasks.sampling.best_candidate", second)
+    monkeypatch.setattr("motionloom.tasks.best.index_of_smallest", second)
     monkeypatch.setattr("motionloom.tasks.completion.index_of_smallest", second)
 
 

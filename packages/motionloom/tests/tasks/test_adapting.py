@@ -13,8 +13,9 @@ from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
 from motionloom.requests.sampling import Sampling
 from motionloom.runtime.text.known import known_sentences
-from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors, lines_by_text, remarks_on_words
+from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors
 from motionloom.tasks.long import load_segment_adapters, long_features
+from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.text import sample_features
 from motionloom.weights.adapter import Adapter, fingerprint, origin
 from motionloom.weights.prior import Prior

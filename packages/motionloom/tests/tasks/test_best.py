@@ -1,6 +1,8 @@
 """Best of several seeds: which is kept, that it depends on its own motion alone, and what cannot be asked."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,6 +10,8 @@ import pytest
 from motionloom.diffusion.sampling import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.requests.sampling import Sampling
+from motionloom.tasks.best import Chooser, best_candidate
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Rows, sample, with_best_seeds
 from motionloom.tasks.text import finish, generate, sample_features
 from motionloom.weights.prior import Prior
@@ -24,14 +28,28 @@ def prior() -> Prior:
     return tiny.prior()
 
 
-def best(prior: Prior, prompts: list[str], seeds: list[int], count: int = 4) -> list[int]:
-    return list(with_best_seeds(prior, Rows(prompts, [12] * len(seeds), seeds), replace(SAMPLING, best_of=count)).seeds)
+def best(prior: Prior, prompts: list[str], seeds: list[int], choose: Chooser = best_in_words) -> list[int]:
+    rows = Rows(prompts, [12] * len(seeds), seeds)
+    return list(with_best_seeds(prior, rows, replace(SAMPLING, best_of=4), choose=choose).seeds)
+
+
+class Verdict:
+    """A judge with recorded answers."""
+
+    def __init__(self, shares: Sequence[float]) -> None:
+        self.shares = iter(shares)
+
+    def share_met(self, text: str, positions: np.ndarray, fps: float) -> float:
+        return next(self.shares)
+
+    def asks_for_rest(self, text: str) -> bool:
+        return True
 
 
 def test_of_equals_the_one_nearest_to_the_mean_at_pure_noise_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the weights that ship. The mean is estimated here from other noise, 24 rows of it."""
     monkeypatch.setattr(
-        "motionloom.tasks.best._candidate_ranks", lambda prior, prompt, estimates: [()] * len(estimates)
+        "motionloom.tasks.best._candidate_ranks", lambda prior, prompt, estimates, judge: [()] * len(estimates)
     )
     prior, tried = Prior.load(), [7, *(row_seed(7, number) for number in range(1, 5))]
     noise = normal((24, 40, 263), 1)
@@ -48,14 +66,12 @@ def test_what_words_allow_to_check_comes_first_and_a_whole_body_second(
     prior: Prior, monkeypatch: pytest.MonkeyPatch, met: tuple[int, ...], whole: tuple[int, ...], place: int
 ) -> None:
     """Whatever is nearest to the mean. Two that do as much: the livelier."""
-    shares, bodies = iter(met), iter(whole)
+    bodies = iter(whole)
     far = iter([0.1, 0.2, 0.3, 0.2])
-    monkeypatch.setattr("motionloom.tasks.best.share_met", lambda *_: next(shares))
     monkeypatch.setattr("motionloom.tasks.best.wholeness", lambda _: next(bodies))
     monkeypatch.setattr("motionloom.tasks.best._distance", lambda *_: next(far))
-    monkeypatch.setattr("motionloom.tasks.best.asks_for_rest", lambda _: True)
     seeds = [7, *(row_seed(7, number) for number in range(1, 4))]
-    assert best(prior, [WALK], [7]) == [seeds[place]]
+    assert best(prior, [WALK], [7], partial(best_candidate, judge=Verdict(met))) == [seeds[place]]
 
 
 def test_halfway_gives_the_estimates_after_half_of_the_calls(prior: Prior) -> None:

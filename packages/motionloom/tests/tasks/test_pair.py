@@ -10,9 +10,10 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
-from motionloom.features.pair import PairMotion, one_world
+from motionloom.features.pair import PairMotion
 from motionloom.goals.goal import Goal
 from motionloom.ground import GroundPose
+from motionloom.kinematics.shared_world import one_world
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.runtime.pair import PairSession

@@ -21,10 +21,10 @@ import numpy as np
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features.pair import checked, one_world
 from motionloom.io.atomic import finished
 from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import ANKLES, TOES, Array, J, smooth, velocity
+from motionloom.kinematics.shared_world import checked, one_world
 from motionloom.retarget.floor import level
 from motionloom_lab.papers.plain_pickle import read_plain_file
 from motionloom_train.data.pairs import Pair

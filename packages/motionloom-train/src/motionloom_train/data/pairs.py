@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.features.pair import together
 from motionloom.io import load
 from motionloom.io.atomic import finished
 from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import Array
+from motionloom.kinematics.shared_world import together
 from motionloom.reading import read_bytes
 from motionloom.skeleton import SMPL22
 from motionloom_train.data import sources

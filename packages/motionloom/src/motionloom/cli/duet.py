@@ -35,7 +35,7 @@ from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.reading import resolve_sampling
 from motionloom.requests.tasks import Duet
 from motionloom.retarget import joints22
-from motionloom.tasks.adapting import remarks_on_words
+from motionloom.tasks.remarks import remarks_on_words
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock

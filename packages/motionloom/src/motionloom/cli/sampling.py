@@ -26,8 +26,9 @@ from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import build_request
 from motionloom.requests.tasks import Generate
-from motionloom.tasks.adapting import adapt, lines_by_text, remarks_on_words
+from motionloom.tasks.adapting import adapt
 from motionloom.tasks.edit import Loop, edit
+from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.run import Models, Plan, Result, run
 from motionloom.weights.prior import Prior
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.arrays import true_spans
 from motionloom.edits.stances import carried
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
 from motionloom.goals.goal import Goal
 from motionloom.kinematics import costs
 from motionloom.kinematics.feet import planted_feet
-from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.ik import LIMBS
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from motionloom.arrays import true_spans
 from motionloom.kinematics.gestures import (
     airborne,
     forward_bend,
@@ -16,7 +17,6 @@ from motionloom.kinematics.gestures import (
     oscillations,
     pelvis_height,
     single_foot_hops,
-    true_spans,
     wrist_thrust,
 )
 from motionloom.kinematics.physics import ANKLES, TOES, WRISTS, Array, in_body, odd, smooth

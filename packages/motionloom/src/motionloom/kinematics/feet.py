@@ -13,10 +13,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.arrays import true_spans
 from motionloom.blending import hermite, shares, smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
-from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.ik import LIMBS, Limb, aim, hinge_frame, reach
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22

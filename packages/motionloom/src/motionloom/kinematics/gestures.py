@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from motionloom.arrays import true_spans
 from motionloom.kinematics.physics import ANKLES, FEET, TOES, WRISTS, Array, J, in_body, odd, smooth, velocity
 
 
@@ -41,12 +42,6 @@ class Flight:
     """Metres: greatest height of the lowest foot point over its height on the floor."""
     rise: float
     """Metres: greatest height of the pelvis over its median height in the clip."""
-
-
-def true_spans(mask: np.ndarray | np.bool_) -> list[tuple[int, int]]:
-    """Half-open ranges of consecutive True in flags (frames,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def longest(mask: np.ndarray | np.bool_) -> int:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.blending import smoothstep
 from motionloom.features.humanml import checked
-from motionloom.motion import Motion
-from motionloom.retarget.limbs import local_rotations
+from motionloom.motion import Motion, local_rotations
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]

@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionloom.kinematics.gestures import leg_length, true_spans
+from motionloom.arrays import true_spans
+from motionloom.kinematics.gestures import leg_length
 from motionloom.kinematics.physics import ANKLES, TOES, Array, smooth, velocity
 
 UP = 0.12

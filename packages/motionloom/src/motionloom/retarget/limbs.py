@@ -43,13 +43,6 @@ def placed(skeleton: Skeleton, world: Array) -> Array:
     return places
 
 
-def local_rotations(skeleton: Skeleton, world: Array) -> Array:
-    """World orientations (frames, joints, 4) to each joint's in its parent's frame, without sign flips in time."""
-    local, parents = world.copy(), list(skeleton.parents[1:])
-    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
-    return rot.unroll(rot.normalize(local))
-
-
 def aim(world: Array, body: Body, joint: int, now: Array, direction: Array) -> Array:
     """World rotations (frames, joints, 4) with one SMPL joint's bone turned from ``now`` to ``direction`` (frames, 3).
 

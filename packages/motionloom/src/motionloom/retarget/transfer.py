@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.blending import smoothstep
-from motionloom.motion import Motion
+from motionloom.motion import Motion, local_rotations
 from motionloom.retarget.anatomy import Body, read_body
 from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, LEG_JOINTS, SPINE, TOES, beside, trunk, unit
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
-from motionloom.retarget.limbs import aim, bend_limb, local_rotations, placed, reach, read_shrug, shrug
+from motionloom.retarget.limbs import aim, bend_limb, placed, reach, read_shrug, shrug
 from motionloom.retarget.root import RootMode, place_root
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 

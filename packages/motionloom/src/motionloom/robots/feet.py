@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.arrays import true_spans
 from motionloom.blending import smoothstep
 from motionloom.kinematics.feet import bridge
-from motionloom.kinematics.gestures import true_spans
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -16,8 +16,8 @@ from motionloom.retarget import to_smpl22
 from motionloom.server.job_request import JobRequest
 from motionloom.tasks import run as tasks
 from motionloom.tasks import text
-from motionloom.tasks.adapting import remarks_on_words
 from motionloom.tasks.direct_edits import is_only_head_free
+from motionloom.tasks.remarks import remarks_on_words
 from motionloom.tasks.run import Models, Plan, Result, run, run_each
 from motionloom.tasks.sampling import Progress
 

@@ -23,6 +23,7 @@ from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Batch, Progress, Rows, sample, strength
 from motionloom.tasks.text import check_goal_length, check_prompts, single_person_view, to_motion
 from motionloom.weights.adapter import Adapter, adapted
@@ -155,7 +156,11 @@ def steered_features(
         return _conditioned(net, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
-    states = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=single_person_view(prior)))
+    states = dict(
+        sample(
+            prior, rows, chosen, edits=[steer], progress=progress, view=single_person_view(prior), choose=best_in_words
+        )
+    )
     return [prior.to_features(states[row]) for row in range(len(prompts))]
 
 

@@ -30,6 +30,7 @@ from motionloom.requests.sampling import PairSampling, PairSettings
 from motionloom.runtime.pair import PLACE, PairSession, join, part
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.body import solve_stream
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.long import (
     Row,
     Track,
@@ -218,6 +219,7 @@ def duet_features(
         batch_size=BATCH,
         progress=progress,
         view=ChainView(denoise.row_motion, denoise.poses),
+        choose=best_in_words,
     )
     for row, state in states:
         row.before = None  # what a finished row began with is needed no more

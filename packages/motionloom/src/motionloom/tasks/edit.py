@@ -24,6 +24,7 @@ from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
 from motionloom.requests.tasks import Edit
 from motionloom.retarget import to_smpl22
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.direct_edits import (
     Look,
     Nod,
@@ -388,6 +389,7 @@ def inpaint_motion(
         corrected=True,
         progress=progress,
         view=View(poses, begin=window.begin),
+        choose=best_in_words,
     )
     return _placed(state * spread + prior.mean, whole, window)
 

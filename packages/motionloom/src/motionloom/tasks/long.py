@@ -34,6 +34,7 @@ from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.adapting import adapted_priors, load_adapters
 from motionloom.tasks.body import Places, solve_stream
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
 from motionloom.tasks.text import check_humanml
@@ -209,6 +210,7 @@ def long_features(
         batch_size=BATCH,
         progress=progress,
         view=ChainView(features, poses, each, begin),
+        choose=best_in_words,
     )
     for row, state in states:
         yield features(row, state)

@@ -26,6 +26,7 @@ from motionloom.ground import GroundPose
 from motionloom.requests.sampling import PairSampling, PairSettings, Seed
 from motionloom.requests.shared import LONGEST
 from motionloom.runtime.pair import PairSession, people
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.long import holding_correction
 from motionloom.tasks.people import Duet, PairPast, finish_person, known_state
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
@@ -107,6 +108,7 @@ def pair_features(
             observed=row_edits.observed,
             progress=progress,
             view=view,
+            choose=best_in_words,
         )
     )
     return net.pairs(np.stack([states[row] for row in range(rows)]))

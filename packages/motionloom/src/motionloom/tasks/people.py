@@ -13,8 +13,9 @@ from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.layout import FPS, LAYOUT
-from motionloom.features.pair import PairMotion, one_world, together
+from motionloom.features.pair import PairMotion
 from motionloom.ground import GroundPose
+from motionloom.kinematics.shared_world import one_world, together
 from motionloom.motion import Motion
 from motionloom.requests.shared import LONGEST
 from motionloom.retarget import joints22, to_smpl22

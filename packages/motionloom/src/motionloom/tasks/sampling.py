@@ -30,7 +30,7 @@ from motionloom.requests.sampling import Sampling
 from motionloom.runtime.pair import PairSession
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
-from motionloom.tasks.best import best_candidate, candidate_seeds
+from motionloom.tasks.best import Chooser, best_candidate, candidate_seeds
 from motionloom.tasks.watching import ChainView, LatestEstimates, View
 from motionloom.weights.prior import Prior
 
@@ -119,6 +119,7 @@ def sample(
     corrected: bool = False,
     progress: Progress | None = None,
     view: View | None = None,
+    choose: Chooser = best_candidate,
 ) -> Iterator[tuple[int, State]]:
     """Standardised states (tokens, features) with their rows' numbers, each as soon as its batch is finished.
 
@@ -128,7 +129,7 @@ def sample(
     calls and give the denoised estimates. corrected: rows of one length are given `Prior.smoothed`, with what is
     observed in its place, and through the edits once more, at level 0. view: how each network call is seen by who is
     `watching`; None: nobody can.
-    Where the sampling asks for the best of several, each motion's seed is chosen first (`with_best_seeds`).
+    Where the sampling asks for the best of several, ``choose`` finds each motion's seed first (`with_best_seeds`).
     Raises MotionloomError for more steps than the weights have levels.
     """
     way = sampling.levels(prior.schedule, observed.strength if observed else 1.0)
@@ -136,7 +137,15 @@ def sample(
         people, total = view.people if view else 1, len(_batches(prior, rows, sampling)) * (len(way) - 1)
         choosing, progress = _split_progress(progress, of=total)
         rows = with_best_seeds(
-            prior, rows, sampling, network=network, edits=edits, observed=observed, people=people, progress=choosing
+            prior,
+            rows,
+            sampling,
+            network=network,
+            edits=edits,
+            observed=observed,
+            people=people,
+            progress=choosing,
+            choose=choose,
         )
     batches, calls = _batches(prior, rows, sampling), 0
     if halfway:
@@ -227,6 +236,7 @@ def with_best_seeds(
     observed: Observed | None = None,
     people: int = 1,
     progress: Progress | None = None,
+    choose: Chooser = best_candidate,
 ) -> Rows:
     """The same rows, each motion with the best of ``sampling.best_of`` seeds (`tasks.best`).
 
@@ -253,7 +263,7 @@ def with_best_seeds(
         own = range(first, first + people)
         states = np.stack([estimates[first * count + place] for place in range(count * people)])
         states = states.reshape(count, people, *states.shape[1:])[:, :, rows.slots :]
-        number = best_candidate(prior, rows.of(own).prompts, states, seeds=seeds_of_rows[first], level=level)
+        number = choose(prior, rows.of(own).prompts, states, seeds=seeds_of_rows[first], level=level)
         chosen[first : first + people] = [seeds_of_rows[row][number] for row in own]
     return replace(rows, seeds=chosen)
 
@@ -322,6 +332,7 @@ def sample_chain(
     batch_size: int,
     view: ChainView[R],
     progress: Moves | None = None,
+    choose: Chooser = best_candidate,
 ) -> Iterator[tuple[R, State]]:
     """Rows of a chain whose ends overlap, each with its clean state (length, features), in order.
 
@@ -359,7 +370,7 @@ def sample_chain(
             states = list(snapshot.clean)
             moved(0)
         motions = np.stack([row.motions(state) for state in states])
-        return seeds[best_candidate(prior, row.texts, motions, seeds=seeds, level=way[0])]
+        return seeds[choose(prior, row.texts, motions, seeds=seeds, level=way[0])]
 
     def reported(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         some = [waiting[number] for number in numbers]

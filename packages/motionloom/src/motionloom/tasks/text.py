@@ -23,6 +23,7 @@ from motionloom.requests.sampling import SOLVER as SOLVER
 from motionloom.requests.sampling import SPACING as SPACING
 from motionloom.requests.sampling import STEPS as STEPS
 from motionloom.requests.shared import LONGEST
+from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Progress, Rows, sample
 from motionloom.tasks.supported import add_support
 from motionloom.tasks.watching import View
@@ -65,7 +66,9 @@ def _sample_motions(
     check_prompts(rows.prompts)
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in rows.seeds):
         raise MotionloomError(f"seed must be {specs(Sampling)['seed'].range}; got {min(rows.seeds)}")
-    for row, state in sample(prior, rows, sampling, progress=progress, view=single_person_view(prior)):
+    for row, state in sample(
+        prior, rows, sampling, progress=progress, view=single_person_view(prior), choose=best_in_words
+    ):
         yield row, prior.to_features(state)
 
 

@@ -31,12 +31,12 @@ from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
 from motionloom.requests.sampling import SOLVER, Sampling, Settings
-from motionloom.tasks.adapting import lines_by_text, remarks_on_words
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
 from motionloom.tasks.reattempts import ATTEMPTS, attempt_seed, reattempt, replacement_line
 from motionloom.tasks.redraw import Timed
+from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support
