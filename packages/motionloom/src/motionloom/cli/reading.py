@@ -12,6 +12,7 @@ from motionloom.io.bvh import read_bvh
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.upright import stood_up, up_axis
+from motionloom.skeleton import Skeleton
 
 RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
 
@@ -68,16 +69,21 @@ HUMAN_LEGS = (0.5, 1.3)
 """Metres of thigh and shin."""
 
 
+def legs_of(skeleton: Skeleton) -> float | None:
+    """Metres of thigh and shin; None for what is no person, of which no length is known."""
+    try:
+        return read_body(skeleton).leg
+    except MotionloomError:
+        return None
+
+
 def check_size(arguments: Namespace, path: Path, motion: Motion) -> None:
     """Refuse bones of no human length without a unit; a file of our own (.npz) or with a unit is believed."""
     if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):
         return
-    try:
-        leg = read_body(motion.skeleton).leg
-    except MotionloomError:
-        return  # no person: no length is known
+    leg = legs_of(motion.skeleton)
     low, high = HUMAN_LEGS if path.suffix.lower() == ".bvh" else (0.2, 3.0)  # characters are dwarfs and giants
-    if not low <= leg <= high:
+    if leg is not None and not low <= leg <= high:
         fail(
             f"the legs of the person in {path} would be {leg:.3g} m long; say which unit the file is in with --unit "
             "(m, dm, cm, mm, inch, or metres; --unit m takes it as it is)"
