@@ -10,8 +10,8 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import with_clips
 from motionloom.io.bvh import read_bvh
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import read_body
-from motionloom.retarget.upright import stood_up, up_axis
+from motionloom.retarget.anatomy import HUMAN_LEGS, read_body
+from motionloom.retarget.upright import set_upright
 from motionloom.skeleton import Skeleton
 
 RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
@@ -28,14 +28,15 @@ def read_clip(arguments: Namespace, path: Path) -> tuple[Motion, float | None, d
             f"--clip picks one of several animations of a {', '.join(with_clips())}, and {path} is none; leave it out "
             "(--clip-name names the one that is written)"
         )
-    unit, orders = None, {}
+    unit, orders, up = None, {}, arguments.up
     if path.suffix.lower() == ".bvh" and not path.is_dir() and arguments.asf is None:
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
-        motion, unit, orders = file.motion, file.unit, dict(file.orders)
+        source_map = getattr(arguments, "source_map", None)
+        motion, unit, orders = set_upright(file.motion, path, up, override=source_map), file.unit, dict(file.orders)
     else:
-        options = {"fps": arguments.source_fps, "asf": arguments.asf, "unit": arguments.unit}
+        options = {"fps": arguments.source_fps, "asf": arguments.asf, "unit": arguments.unit, "up": up}
         motion = io.load(path, clip=arguments.animation, **options)
-    return _upright(motion, path, arguments), unit, orders
+    return motion, unit, orders
 
 
 def load_motion(arguments: Namespace, path: Path) -> Motion:
@@ -43,30 +44,6 @@ def load_motion(arguments: Namespace, path: Path) -> Motion:
     from motionloom.cli.robots import read_motion, reads_as_clip
 
     return read_motion(arguments, path) if reads_as_clip(arguments, path) else io.load(path)
-
-
-def _upright(motion: Motion, path: Path, arguments: Namespace) -> Motion:
-    """The motion with +Y up, by the line or by how people stand; a remark where the file was turned."""
-    choice = arguments.up
-    if choice is None and path.suffix.lower() not in (".bvh", ".amc"):
-        return motion  # these formats define what is up
-    try:
-        axis = up_axis(motion, getattr(arguments, "source_map", None))
-    except MotionloomError:
-        return stood_up(motion) if choice == "z" else motion  # no person: nothing is known
-    if choice == "z" and axis == "y":
-        fail(f"--up z, but the person in {path} stands along Y, which is up then; leave out --up")
-    if choice is None and axis == "z?":
-        fail(
-            f"the person in {path} lies along Z all the time; say --up z if Z is up in the file, --up y if they do lie"
-        )
-    if choice is None and axis == "z":
-        note(f"Z is up in {path}, as the person stands; it was turned (--up y leaves it)")
-    return stood_up(motion) if choice == "z" or (choice is None and axis == "z") else motion
-
-
-HUMAN_LEGS = (0.5, 1.3)
-"""Metres of thigh and shin."""
 
 
 def legs_of(skeleton: Skeleton) -> float | None:

@@ -9,7 +9,7 @@ from math import degrees
 from pathlib import Path
 
 from motionloom import io
-from motionloom.cli.reading import HUMAN_LEGS, legs_of
+from motionloom.cli.reading import legs_of
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import fail
 from motionloom.errors import MotionloomError
@@ -24,7 +24,7 @@ from motionloom.io.gltf_read import open_glb
 from motionloom.io.stream import PERSON, Kept, Stream, check_length, open_stream
 from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import RootMode, retarget
-from motionloom.retarget.anatomy import Body, read_body
+from motionloom.retarget.anatomy import HUMAN_LEGS, Body, read_body
 from motionloom.retarget.hands import HandPose, check_fingers, pose_hands
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.root import place_root
