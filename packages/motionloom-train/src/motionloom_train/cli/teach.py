@@ -70,7 +70,7 @@ def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "t
     motions, findings = [], []
     for one in captioned:
         try:
-            unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc") else None
+            unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc", ".npz") else None
             motions.append(load(one.path, fps=arguments.source_fps, unit=unit, up=arguments.up))
             findings.append(check_file(motions[-1]))
         except MotionloomError as error:
