@@ -24,9 +24,10 @@ class Format:
     reader: str | Callable[..., Any] = ""
     """``(path, **options) -> Motion`` in metres; empty: it is not read."""
     options: tuple[str, ...] = ()
-    """Those of ``fps``, ``unit``, ``asf`` and ``clip`` that the reader takes; else the first two come after it."""
-    metres: bool = False
-    """It is in metres by its definition, so that a unit is a mistake."""
+    """Those of ``fps``, ``unit``, ``up``, ``asf`` and ``clip`` that the reader takes; else the first three come after
+    it."""
+    any_up: bool = False
+    """It does not say which way is up, which is found by how the person moves."""
     clips: bool = False
     """It holds several animations, of which ``clip`` picks one."""
     people: str | Callable[..., Any] = ""

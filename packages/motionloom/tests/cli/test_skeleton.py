@@ -71,6 +71,52 @@ def test_a_character_that_lies_at_rest_is_said(capsys: pytest.CaptureFixture[str
     assert "+Y" not in capsys.readouterr().err
 
 
+def with_positions(path: str, unit: float, offsets: float, noise: float) -> np.ndarray:
+    """A person whose bones stand in position channels; the OFFSETs are so many times as long. Gives the bones in the
+    file's unit."""
+    bones = SMPL22.offsets / unit
+    children = {j: [k for k, parent in enumerate(SMPL22.parents) if parent == j] for j in range(22)}
+
+    def joint(j: int) -> list[str]:
+        offset = " ".join(f"{v:.8f}" for v in offsets * bones[j])
+        channels = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+        inside = [line for k in children[j] for line in joint(k)] or ["End Site { OFFSET 0 0 0 }"]
+        return [f"{'JOINT' if j else 'ROOT'} {SMPL22.names[j]} {{", f"OFFSET {offset}", channels, *inside, "}"]
+
+    rng, walk = np.random.default_rng(3), person(1.0, 20.0)
+    rows = np.zeros((len(walk), 22, 6))
+    rows[..., :3] = bones + rng.normal(0, noise, (len(walk), 22, 3)) * np.linalg.norm(bones, axis=1)[None, :, None]
+    rows[:, 0, :3] = walk.root / unit
+    order = lines_order(children)
+    text = ["HIERARCHY", *joint(0), "MOTION", f"Frames: {len(walk)}", "Frame Time: 0.05"]
+    text += [" ".join(f"{v:.8f}" for v in row[order].ravel()) for row in rows]
+    Path(path).write_text("\n".join(text) + "\n")
+    return np.linalg.norm(bones, axis=1)
+
+
+def lines_order(children: dict[int, list[int]]) -> list[int]:
+    """The joints in the order of the file."""
+    order, stack = [], [0]
+    while stack:
+        order.append(stack.pop())
+        stack += reversed(children[order[-1]])
+    return order
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01, 0.001, 0.0254, 0.0254 / 0.45])
+@pytest.mark.parametrize(("offsets", "noise"), [(0.0, 0.0), (0.0, 0.02), (0.1, 1e-6), (1.0, 1e-3)])
+def test_a_character_whose_bones_stand_in_position_channels_comes_out_at_its_size(
+    unit: float, offsets: float, noise: float
+) -> None:
+    bones = with_positions("own.bvh", unit, offsets, noise)
+    for words in ((), ("--unit", str(unit))):
+        assert main(["export", "walk.bvh", "out.bvh", "--skeleton", "own.bvh", "--force", *words]) == 0
+        skeleton = io.load("out.bvh", unit=1.0).skeleton
+        lengths = skeleton.bone_lengths()[[skeleton.index(name) for name in SMPL22.names[1:]]]
+        np.testing.assert_allclose(lengths, bones[1:], rtol=0.05)
+        assert io.load("out.bvh").root[:, 1].mean() == pytest.approx(0.95, abs=0.1)
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -130,7 +130,7 @@ def test_names_with_spaces_colons_and_other_letters_survive(tmp_path, name):
     assert load_bvh(save_bvh(motion, tmp_path / "again.bvh"), unit=1).skeleton.names[1] == name
 
 
-def test_position_channels_replace_the_offset_and_constant_ones_become_it(tmp_path):
+def test_position_channels_replace_the_offset_and_usual_ones_become_it(tmp_path):
     six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     text = ARM.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
     rows = "0 0 0 0 0 0 {} 5 6 0 0 0\n0 0 0 0 0 0 4 5 6 0 0 0\n"
@@ -139,7 +139,7 @@ def test_position_channels_replace_the_offset_and_constant_ones_become_it(tmp_pa
     np.testing.assert_array_equal(still.skeleton.offsets[1], (4, 5, 6))
     moves = load_bvh(write(tmp_path, text.partition("0.0333333\n")[0] + "0.0333333\n" + rows.format(3)), unit=1)
     np.testing.assert_allclose(moves.positions()[:, 1], [(3, 5, 6), (4, 5, 6)])
-    np.testing.assert_array_equal(moves.skeleton.offsets[1], (1, 0, 0))
+    np.testing.assert_array_equal(moves.skeleton.offsets[1], (3.5, 5, 6))
 
 
 def test_a_long_file_is_read_in_pieces_that_need_not_end_with_a_row(tmp_path, monkeypatch):

@@ -10,11 +10,14 @@ import pytest
 from hypothesis import given, settings
 
 from motionloom import io
+from motionloom import rotations as rot
+from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
 from motionloom.io.npz import load_npz, save_npz
 from motionloom.motion import Motion
 from motionloom.retarget import retarget, to_smpl22
+from motionloom.retarget.upright import AXES
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22, Poses
 from tests.io.motions import motions
@@ -107,6 +110,54 @@ def test_plain_positions_are_read_where_they_say_their_rate(tmp_path):
     with pytest.raises(MotionloomError, match="give the frame rate"):
         io.load(tmp_path / "b.npz")
     assert io.load(tmp_path / "b.npz", fps=25).fps == 25
+
+
+def joints(path: Path, axis: str = "y", unit: float = 1.0, places: np.ndarray | None = None) -> np.ndarray:
+    """Plain positions of a walk with another axis up and in another unit; gives the places in metres, +Y up."""
+    places = to_smpl22(walk()).positions() if places is None else places
+    turned = rot.rotate(rot.inverse(rot.rotvec_to_quat(AXES[axis][1])), places)
+    np.savez(path, joints=turned.astype(np.float32) / unit, fps=30)
+    return places
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_plain_positions_with_another_axis_up_are_refused_until_it_is_told(tmp_path, axis, capsys):
+    places = joints(tmp_path / "a.npz", axis)
+    if axis != "y":
+        with pytest.raises(MotionloomError, match=f"--up {axis}"):
+            io.load(tmp_path / "a.npz")
+        for words in (("export", "a.npz", "b.bvh"), ("info", "a.npz"), ("view", "a.npz")):
+            line = [word if "." not in word else str(tmp_path / word) for word in words]
+            assert main(line) == 2
+            assert f"--up {axis}" in capsys.readouterr().err
+    again = io.load(tmp_path / "a.npz", up=axis).positions()
+    assert np.abs(again - places).max() < 0.1
+    assert main(["export", str(tmp_path / "a.npz"), str(tmp_path / "b.npz"), "--up", axis]) == 0
+    np.testing.assert_allclose(io.load(tmp_path / "b.npz").positions(), again, atol=1e-5)
+
+
+@pytest.mark.parametrize("unit", [0.01, 0.001, 0.0254, 0.3048, 0.0254 / 0.45])
+def test_plain_positions_in_another_unit_are_refused_until_it_is_told(tmp_path, unit, capsys):
+    places = joints(tmp_path / "a.npz", unit=unit)
+    for words in (["export", str(tmp_path / "a.npz"), str(tmp_path / "b.npz")], ["info", str(tmp_path / "a.npz")]):
+        assert main(words) == 2
+        assert "--unit" in capsys.readouterr().err
+        assert main([*words, "--unit", str(unit)]) == 0
+    assert np.abs(io.load(tmp_path / "b.npz").positions() - places).max() < 0.1
+
+
+def test_positions_of_somebody_who_lies_are_read_with_a_remark(tmp_path):
+    """Who lies at full length may as well stand with another axis up."""
+    lies = still(30).positions()[..., [0, 2, 1]] * [1.0, 1.0, -1.0]
+    lies[..., 1] -= lies[..., 1].min()
+    joints(tmp_path / "a.npz", places=lies)
+    with pytest.warns(UserWarning, match="not certain which way is up.*--up"):
+        assert np.ptp(io.load(tmp_path / "a.npz").positions()[..., 1]) < 0.6
+
+
+def test_a_motion_with_rotations_is_in_metres_by_its_format(tmp_path):
+    with pytest.raises(MotionloomError, match="in metres by its format"):
+        io.load(io.save(still(), tmp_path / "a.npz"), unit=0.01)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,13 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.kinematics.physics import WRISTS, J
-from motionloom.kinematics.stairs import falls_from_above, hovering, stairs
+from motionloom.kinematics.stairs import falls_from_above, hovering, in_the_air, stairs
 from motionloom.motion import Motion
+from motionloom.requests.sampling import Sampling
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated
+from motionloom.tasks import run
+from motionloom.tasks.run import Models, Plan, Result
+from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated, remarks_on_air
 
 FPS = 20.0
 
@@ -53,6 +56,58 @@ def test_who_hovers_comes_down_and_who_stands_or_sits_high_stays() -> None:
     jump = lifted(np.maximum(0.0, 2.5 * (t - 1) - 9.81 / 2 * (t - 1) ** 2) * (t > 1))
     for other in (jump, lifted(np.zeros(60)), lifted(np.full(60, 0.3))):
         assert add_support(other) is other
+
+
+@pytest.mark.parametrize(
+    ("heights", "spans"),
+    [
+        (np.full(60, 0.3), [(0, 60)]),
+        (np.repeat([0.0, 0.3, 0.0], [20, 20, 20]), [(20, 40)]),
+        (np.repeat([0.0, 0.3, 0.0], [20, 19, 20]), []),  # less than a second
+        (np.full(60, 0.09), []),
+        (np.zeros(60), []),
+    ],
+)
+def test_who_is_in_the_air_for_a_second_is_found(heights: np.ndarray, spans: list[tuple[int, int]]) -> None:
+    assert in_the_air(lifted(heights).positions(), FPS) == spans
+
+
+def test_steps_are_something_to_stand_on() -> None:
+    assert in_the_air(climbing(0, 0.2, 0.4, 0.6, 0.8).positions(), FPS) == []
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [(["a person sits"], True), (["a person waves", "he jumps high"], False), (["she climbs a ladder"], False)],
+)
+def test_who_is_in_the_air_is_remarked_where_the_words_are_of_no_climb_or_jump(texts: list[str], said: bool) -> None:
+    motion = lifted(np.repeat([0.0, 0.3], [20, 40]))
+    remarks = remarks_on_air([motion], texts)
+    assert remarks == (
+        ["the person is 0.30 m above the floor from 1.0 to 3.0 s with nothing underneath"] if said else []
+    )
+    assert not remarks_on_air([motion], texts, floor=0.3)
+    both = remarks_on_air([lifted(np.zeros(60)), motion], texts, begin_s=2.0)
+    assert all("person 2" in one and "from 3.0 to 5.0 s" in one for one in both)
+    assert bool(both) == said
+
+
+@pytest.mark.parametrize("task", ["generate", "control", "edit", "predict", "switch", "duet"])
+def test_every_task_says_who_is_in_the_air(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over the floor y = 0, or over that of the motion that is changed or gone on from."""
+    high, low = lifted(np.full(60, 0.3)), lifted(np.zeros(60))
+
+    def sampled(plan: Plan, models: Models, progress: object) -> list[Result]:
+        return [Result((high,), remarks=["first"])]
+
+    monkeypatch.setitem(run._TASKS, task, (sampled, 1))
+    plan = Plan(task=task, values=object(), sampling=Sampling())
+    [result] = run.run(plan, Models())
+    assert result.remarks == ["first", *result.aloft]
+    assert len(result.aloft) == 1
+    for people, count in (((high,), 0), ((low,), 1)):
+        [result] = run.run(replace(plan, people=people), Models())
+        assert len(result.aloft) == count
 
 
 def test_who_falls_from_above_the_floor_stood_on_it() -> None:

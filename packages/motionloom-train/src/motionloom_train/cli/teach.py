@@ -65,15 +65,13 @@ def _words(words: list[str]) -> tuple[str, list[str]]:
 def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "tuple[list[Motion], list[list[Any]]]":
     """The clips, and what is wrong with each."""
     from motionloom.io import load
-    from motionloom.retarget.upright import stood_up
     from motionloom_train.data.examples import check_file
 
     motions, findings = [], []
     for one in captioned:
         try:
-            unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc") else None
-            motion = load(one.path, fps=arguments.source_fps, unit=unit)
-            motions.append(stood_up(motion) if arguments.up == "z" else motion)
+            unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc", ".npz") else None
+            motions.append(load(one.path, fps=arguments.source_fps, unit=unit, up=arguments.up))
             findings.append(check_file(motions[-1]))
         except MotionloomError as error:
             findings.append(check_file(error))

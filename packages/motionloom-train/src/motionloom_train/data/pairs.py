@@ -114,7 +114,7 @@ def _pack_pair(folder: Path, first: dict[str, str], second: dict[str, str]) -> P
     if first["split"] != second["split"] or first["split"] not in ("train", "val", "test"):
         raise ValueError(f"{first['clip']} and {second['clip']} are in no common split")
     motions = [
-        load(inside(folder, row["path"]), fps=float(row["fps"]), unit=float(row["metres_per_unit"]))
+        load(inside(folder, row["path"]), fps=float(row["fps"]), unit=float(row["metres_per_unit"]), up="y")
         for row in (first, second)
     ]
     name = f"{first['clip']}+{second['clip']}"

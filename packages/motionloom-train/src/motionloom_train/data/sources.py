@@ -20,6 +20,7 @@ from motionloom.io.npz import read_array
 from motionloom.kinematics.physics import Array
 from motionloom.motion import Motion
 from motionloom.retarget import joints22, to_smpl22
+from motionloom.retarget.upright import AXES
 from motionloom_train.data.paths import DAMAGED, inside
 from motionloom_train.data.words import check_caption, describe_index
 
@@ -128,7 +129,10 @@ def _pack_take(folder: Path, row: dict[str, str], captions: dict[str, list[Span]
     if index and (not spans or source.startswith(("cmu", "bandai"))):  # a whole sentence is no entry of an index
         spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
     unit = None if path.suffix == ".amc" else float(row["metres_per_unit"])
-    read = _reader(path, fps=float(row["fps"]), unit=unit)
+    up = (row.get("up_axis") or "y").lower()
+    if up not in AXES:
+        raise ValueError(f"up_axis {up!r} of {row['clip']} is not one of {', '.join(AXES)}")
+    read = _reader(path, fps=float(row["fps"]), unit=unit, up=up)
     kind = "keyed" if (row.get("kind") or "").startswith("hand-keyed") else "capture"
     return Take(row["clip"], source, row.get("licence") or _licence(source), row["split"], tuple(spans), read, kind)
 
@@ -224,8 +228,8 @@ def places_of(motion: Motion) -> Places:
     return Places(to_smpl22(motion).positions(), joints22(motion), motion.fps)
 
 
-def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[], Places]:
-    return lambda: places_of(load(path, fps=fps, unit=unit))
+def _reader(path: Path, *, fps: float | None, unit: float | None, up: str | None = None) -> Callable[[], Places]:
+    return lambda: places_of(load(path, fps=fps, unit=unit, up=up))
 
 
 def read_features(path: Path) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Rows to motions: what every process of a batch does, wherever it runs."""
 
 import hashlib
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import Controlled, evaluate
-from motionloom.tasks.run import Models, Plan, run, run_each
+from motionloom.tasks.run import Models, Plan, Result, run, run_each
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features
 from motionloom.weights.container import PAIRS, weights_digest
 from motionloom.weights.prior import find_weights
@@ -249,9 +250,12 @@ class Maker:
             return [self._duet(first)]
         if first.timeline is not None:
             [result] = run(self._plan(first), self.models)
+            _warn(first, result)
             keeps = {} if result.about is None else {"keeps": all(one.kept for one in result.about.amounts)}
             return [self._measured(first, result.people[0], **keeps)]
         results = [one for _, one in run_each([self._plan(one) for one in rows], self.models)]
+        for one, result in zip(rows, results, strict=True):
+            _warn(one, result)
         return [
             self._measured(one, result.people[0], **_misses(result.about))
             for one, result in zip(rows, results, strict=True)
@@ -302,6 +306,7 @@ class Maker:
         """Two people, one pair at a time: what is sampled beside it would change the last bits."""
         texts = (order.text, order.text) if order.timeline else prompts_of(order.row.words)
         [result] = run(self._plan(order), self.models)
+        _warn(order, result)
         duet = result.people[0], result.people[1]
         measured = measure_two(duet, texts, self.judge)
         if order.goal is not None:
@@ -325,6 +330,11 @@ class Maker:
         if self.options.fps is not None:
             people = [motion.resample(self.options.fps) for motion in people]
         return Made(tuple(people), tuple(measured))
+
+
+def _warn(order: Order, result: Result) -> None:
+    for line in result.aloft:
+        warnings.warn(f"{order.id}: {line}", stacklevel=2)
 
 
 def _misses(controlled: Controlled | None) -> dict[str, float]:

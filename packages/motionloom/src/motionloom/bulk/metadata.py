@@ -157,7 +157,7 @@ def _motions(store: Store, shard: int, counts: dict[str, int]) -> dict[Any, Peop
     if store.kind == "glb":
         return {name: tuple(load_scene(place / f"{name}.glb")) for name in counts}
     return {
-        name: tuple(load(place / file) for file in file_names(name, f".{store.kind}", people))
+        name: tuple(load(place / file, up="y") for file in file_names(name, f".{store.kind}", people))
         for name, people in counts.items()
     }
 
@@ -171,7 +171,7 @@ def _from_tar(place: Path, ids: Collection[str]) -> dict[Any, People]:
                 if member.name.endswith(".npz") and data is not None and name in ids:
                     part = Path(folder) / "motion.npz"
                     part.write_bytes(data.read())
-                    motions[name] = (*motions.get(name, ()), load(part))
+                    motions[name] = (*motions.get(name, ()), load(part, up="y"))
     except (tarfile.TarError, KeyError, OSError) as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{place} is damaged ({reason}); delete it and run the batch again") from None

@@ -60,7 +60,8 @@ def _write(arguments: Namespace, out: Path, clips: list[tuple[Motion, Target]]) 
         target.save_clips([motion for motion, _ in clips], out, names)
     elif out.suffix.lower() == ".bvh":
         motion = target.motion_for(motion, out)
-        chosen = arguments.out_unit or unit_that_reads_back(motion, target.unit or 1.0)
+        own = target.unit if target.skeleton is not None else None  # a character's file keeps its unit
+        chosen = arguments.out_unit or own or unit_that_reads_back(motion, target.unit or 1.0)
         if unit_that_reads_back(motion, chosen) != chosen:
             note(f"give --unit {chosen:g} to read {out} at this size: bones do not show it")
         save_bvh(motion, out, order=arguments.order or target.orders, unit=chosen)

@@ -205,7 +205,7 @@ def _generated(
         for _, result in run_each(plans, Models(prior), progress):
             one = replace(result.about, unknown=unknown)
             worded.append(one)
-            for line in one.shortfalls:
+            for line in (*one.shortfalls, *result.aloft):
                 whose = f"motion {len(worded)}: " if several else ""
                 say(f"{whose}{line}")
             yield from result.people

@@ -10,8 +10,9 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import with_clips
 from motionloom.io.bvh import read_bvh
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import read_body
-from motionloom.retarget.upright import stood_up, up_axis
+from motionloom.retarget.anatomy import HUMAN_LEGS, read_body
+from motionloom.retarget.upright import set_upright
+from motionloom.skeleton import Skeleton
 
 RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
 
@@ -27,14 +28,15 @@ def read_clip(arguments: Namespace, path: Path) -> tuple[Motion, float | None, d
             f"--clip picks one of several animations of a {', '.join(with_clips())}, and {path} is none; leave it out "
             "(--clip-name names the one that is written)"
         )
-    unit, orders = None, {}
+    unit, orders, up = None, {}, arguments.up
     if path.suffix.lower() == ".bvh" and not path.is_dir() and arguments.asf is None:
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
-        motion, unit, orders = file.motion, file.unit, dict(file.orders)
+        source_map = getattr(arguments, "source_map", None)
+        motion, unit, orders = set_upright(file.motion, path, up, override=source_map), file.unit, dict(file.orders)
     else:
-        options = {"fps": arguments.source_fps, "asf": arguments.asf, "unit": arguments.unit}
+        options = {"fps": arguments.source_fps, "asf": arguments.asf, "unit": arguments.unit, "up": up}
         motion = io.load(path, clip=arguments.animation, **options)
-    return _upright(motion, path, arguments), unit, orders
+    return motion, unit, orders
 
 
 def load_motion(arguments: Namespace, path: Path) -> Motion:
@@ -44,40 +46,21 @@ def load_motion(arguments: Namespace, path: Path) -> Motion:
     return read_motion(arguments, path) if reads_as_clip(arguments, path) else io.load(path)
 
 
-def _upright(motion: Motion, path: Path, arguments: Namespace) -> Motion:
-    """The motion with +Y up, by the line or by how people stand; a remark where the file was turned."""
-    choice = arguments.up
-    if choice is None and path.suffix.lower() not in (".bvh", ".amc"):
-        return motion  # these formats define what is up
+def legs_of(skeleton: Skeleton) -> float | None:
+    """Metres of thigh and shin; None for what is no person, of which no length is known."""
     try:
-        axis = up_axis(motion, getattr(arguments, "source_map", None))
+        return read_body(skeleton).leg
     except MotionloomError:
-        return stood_up(motion) if choice == "z" else motion  # no person: nothing is known
-    if choice == "z" and axis == "y":
-        fail(f"--up z, but the person in {path} stands along Y, which is up then; leave out --up")
-    if choice is None and axis == "z?":
-        fail(
-            f"the person in {path} lies along Z all the time; say --up z if Z is up in the file, --up y if they do lie"
-        )
-    if choice is None and axis == "z":
-        note(f"Z is up in {path}, as the person stands; it was turned (--up y leaves it)")
-    return stood_up(motion) if choice == "z" or (choice is None and axis == "z") else motion
-
-
-HUMAN_LEGS = (0.5, 1.3)
-"""Metres of thigh and shin."""
+        return None
 
 
 def check_size(arguments: Namespace, path: Path, motion: Motion) -> None:
     """Refuse bones of no human length without a unit; a file of our own (.npz) or with a unit is believed."""
     if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):
         return
-    try:
-        leg = read_body(motion.skeleton).leg
-    except MotionloomError:
-        return  # no person: no length is known
+    leg = legs_of(motion.skeleton)
     low, high = HUMAN_LEGS if path.suffix.lower() == ".bvh" else (0.2, 3.0)  # characters are dwarfs and giants
-    if not low <= leg <= high:
+    if leg is not None and not low <= leg <= high:
         fail(
             f"the legs of the person in {path} would be {leg:.3g} m long; say which unit the file is in with --unit "
             "(m, dm, cm, mm, inch, or metres; --unit m takes it as it is)"

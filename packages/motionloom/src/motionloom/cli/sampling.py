@@ -51,7 +51,10 @@ def request_of(arguments: Namespace, request: type[R], own: Mapping[str, Any]) -
 def results(label: str, plan: Plan, models: Models) -> Iterator[Result]:
     """The results of a task, while a bar shows how far it is."""
     with bar(label) as progress:
-        yield from run(plan, models, progress)
+        for result in run(plan, models, progress):
+            for line in () if plan.task == "compose" else result.aloft:  # which says all its remarks at the end
+                say(line)
+            yield result
 
 
 def load_prior(arguments: Namespace) -> Prior:

@@ -9,6 +9,7 @@ from math import degrees
 from pathlib import Path
 
 from motionloom import io
+from motionloom.cli.reading import legs_of
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import fail
 from motionloom.errors import MotionloomError
@@ -23,7 +24,7 @@ from motionloom.io.gltf_read import open_glb
 from motionloom.io.stream import PERSON, Kept, Stream, check_length, open_stream
 from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import RootMode, retarget
-from motionloom.retarget.anatomy import Body, read_body
+from motionloom.retarget.anatomy import HUMAN_LEGS, Body, read_body
 from motionloom.retarget.hands import HandPose, check_fingers, pose_hands
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.root import place_root
@@ -345,6 +346,9 @@ def _find(arguments: Namespace) -> Target:
         return Target(name, named_skeleton(name.lower()), **options)
     if suffix == ".bvh":
         file = read_bvh(path)
+        leg, unit = legs_of(file.motion.skeleton), getattr(arguments, "unit", None)
+        if leg and unit and HUMAN_LEGS[0] <= leg * unit / file.unit <= HUMAN_LEGS[1]:
+            file = read_bvh(path, unit=unit)  # with other legs it is the unit of the motion that is read
         return Target(name, file.motion.skeleton, unit=file.unit, orders=dict(file.orders), **options)
     if suffix == ".asf":
         return Target(name, load_skeleton(path), **options)

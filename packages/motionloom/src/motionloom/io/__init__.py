@@ -11,6 +11,7 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import Format
 from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
+from motionloom.retarget.upright import set_upright
 
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
@@ -33,24 +34,28 @@ def load(
     fps: float | None = None,
     asf: Path | str | None = None,
     unit: float | None = None,
+    up: str | None = None,
     clip: int | str | None = None,
 ) -> Motion:
     """Read a BVH, AMC (with its ASF), GLB, glTF, VRM, FBX (through Blender) or NPZ file as a `Motion` in metres.
 
     ``fps`` replaces the rate the file states (AMC files state none: 120), without resampling. ``unit`` is metres per
-    unit of length for BVH, ASF and glTF (None: guessed, what the ASF says, metres). ``asf`` is the skeleton of an AMC
-    file (None: looked for beside it). ``clip`` is the number, from 1, or the name of a clip of a glTF or FBX file.
+    unit of length (None: guessed for BVH, what an ASF says, metres for others). ``up`` is the axis of the file that is
+    up, one of `motionloom.retarget.upright.AXES` (None: by how the person moves in BVH and AMC files, Y in others);
+    a file that is turned, or in which it is not certain, is warned of. ``asf`` is the skeleton of an AMC file (None:
+    looked for beside it). ``clip`` is the number, from 1, or the name of a clip of a glTF or FBX file.
     Raises `MotionloomError` for a file that is missing, damaged or of another kind.
     """
     path = Path(path)
-    options = {"fps": fps, "unit": unit, "asf": asf, "clip": clip}
+    options = {"fps": fps, "unit": unit, "up": up, "asf": asf, "clip": clip}
     kind = _checked(path, fps, unit=unit, asf=asf)
     if clip is not None and not kind.clips:
         raise MotionloomError(f"{path} holds one motion; a clip is chosen in {', '.join(formats.with_clips())} files")
     own = {key: options[key] for key in kind.options if options.get(key) is not None}
     motion = _call(kind.reader, path, **own)
     motion = motion if fps is None or "fps" in own else replace(motion, fps=fps)
-    return motion if unit is None or "unit" in own else motion.scaled(unit)
+    motion = motion if unit is None or "unit" in own else motion.scaled(unit)
+    return set_upright(motion, path, up) if "up" not in own and (up or kind.any_up) else motion
 
 
 def _checked(path: Path, fps: float | None, *, unit: float | None, asf: Path | str | None) -> Format:
@@ -68,8 +73,6 @@ def _checked(path: Path, fps: float | None, *, unit: float | None, asf: Path | s
         raise MotionloomError(f"the frame rate must be a number from 0.001 to 100000; got {fps:g}")
     if unit is not None and not 1e-9 < unit < 1e9:
         raise MotionloomError(f"the unit must be a positive number of metres; got {unit:g}")
-    if unit is not None and kind.metres:
-        raise MotionloomError(f"{path} is in metres by its format; a unit is for BVH, ASF and glTF files")
     if asf is not None and "asf" not in kind.options:
         raise MotionloomError(f"{path} has its own skeleton; an ASF file is for AMC files")
     return kind

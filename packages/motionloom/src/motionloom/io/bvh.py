@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 MAX_JOINTS = 10_000
 _POSES = 64
 """How many poses of the clip its skeleton keeps at most (`Skeleton.poses`)."""
+_STRETCH = 2
+"""A joint ends a bone where it is so many times farther from its parent as from its usual place there."""
 _CHANNELS = {f"{axis}{kind}": (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
 
 
@@ -334,31 +336,54 @@ def _complain(data: bytes, start: int, count: int, columns: int, *, path: Path |
 
 def _assemble(frames: _Reader, fps: float, unit: float | None) -> Bvh:
     joints = frames.joints
-    offsets = np.array([j.offset or (0.0, 0.0, 0.0) for j in joints])
     parents = tuple(j.parent for j in joints)
     places = {j: frames.places[:, k] for j, k in frames.moved.items() if j == 0 or frames.places[:, k].any()}
-    moving = np.array([j > 0 and j in places and bool(np.ptp(places[j], axis=0).any()) for j in range(len(joints))])
-    scale = guess_unit(parents, np.where(moving[:, None], 0.0, offsets)) if unit is None else unit
     count = len(frames.rotations)
-    root = places.pop(0, np.broadcast_to(offsets[0], (count, 3))) * scale
+    offsets = np.array([j.offset or (0.0, 0.0, 0.0) for j in joints])
+    root = places.pop(0, np.broadcast_to(offsets[0], (count, 3)))
+    offsets, travels = _bones(parents, offsets, places)
+    scale = guess_unit(parents, np.where(travels[:, None], 0.0, offsets)) if unit is None else unit
+    still = {j for j, place in places.items() if np.ptp(place, axis=0).max() * scale <= SAME_PLACE}
+    for j in still:
+        offsets[j] = places[j][0]
+    root, offsets = root * scale, offsets * scale
     translations = None
-    if any(np.ptp(p, axis=0).max() * scale > SAME_PLACE for p in places.values()):
+    if len(still) < len(places):
         translations = np.empty((count, *offsets.shape))
-        translations[:] = offsets * scale
-    for j, place in places.items():
-        if np.ptp(place, axis=0).max() * scale <= SAME_PLACE:
-            offsets[j] = place[0]
-        if translations is not None:
+        translations[:] = offsets
+        for j, place in places.items():
             np.multiply(place, scale, out=translations[:, j])
     some = slice(None, None, -(-len(root) // _POSES))
     moved = None if translations is None else translations[some].copy()
     poses = Poses(root[some].copy(), frames.rotations[some].copy(), moved)
     names = tuple(joint.name for joint in joints)
     ends = frozenset(i for i, joint in enumerate(joints) if joint.end)
-    skeleton = Skeleton(names, parents, offsets * scale, ends, poses=poses)
+    skeleton = Skeleton(names, parents, offsets, ends, poses=poses)
     orders = {joints[j].name: order for order, (members, _) in frames.orders.items() for j in members}
     motion = Motion(skeleton, fps, root, frames.rotations, translations)
     return Bvh(motion, scale, orders)
+
+
+def _bones(parents: tuple[int, ...], offsets: Array, places: Mapping[int, Array]) -> tuple[Array, NDArray[np.bool_]]:
+    """(joints, 3) offsets as the frames have them, and (joints,) which joints travel, so that they end no bone.
+
+    places: (frames, 3) of joints with position channels, below joint 0. Where a joint stays, its place is its offset,
+    whatever the file says as OFFSET. Where it stays but for noise or stretching, in the body, its usual place is,
+    unless the OFFSET is near that.
+    """
+    offsets, travels = offsets.copy(), np.zeros(len(parents), dtype=bool)
+    body = _first_branch(parents)
+    for j, place in places.items():
+        middle = np.median(place, axis=0)
+        length = float(np.linalg.norm(middle))
+        away = float(np.percentile(np.linalg.norm(place - middle, axis=-1), 90))
+        if not np.ptp(place, axis=0).any():
+            offsets[j] = place[0]
+        elif j <= body or _STRETCH * away > length:
+            travels[j] = True
+        elif np.linalg.norm(offsets[j] - middle) > length / 2:
+            offsets[j] = middle
+    return offsets, travels
 
 
 def _columns(joints: list[_Joint]) -> list[int]:
@@ -385,12 +410,22 @@ def unit_that_reads_back(motion: Motion, unit: float) -> float:
     Where no unit does, as for a giant, ``unit`` itself: the reader of the file has to be given it.
     """
     offsets, moving = moving_offsets(motion)
-    lengths = np.where(np.isin(np.arange(len(offsets)), list(moving))[:, None], 0.0, offsets)
+    parents, moved = motion.skeleton.parents, motion.translations
+    places = {} if moved is None else {j: moved[:, j] for j in moving}
+    offsets, travels = _bones(parents, offsets, places)
+    lengths = np.where(travels[:, None], 0.0, offsets)
     tries = (unit, 1.0, 0.01, 0.0254, 0.0254 / 0.45, 0.001)
     for one in tries:
-        if abs(guess_unit(motion.skeleton.parents, lengths / one) / one - 1) < 1e-9:
+        if abs(guess_unit(parents, lengths / one) / one - 1) < 1e-9:
             return one
     return unit
+
+
+def _first_branch(parents: tuple[int, ...]) -> int:
+    """The first joint with several children, where the body begins; 0 where joint 0 is it."""
+    only_child = np.bincount(np.array(parents[1:], int), minlength=len(parents)) == 1
+    first = int(np.argmin(only_child)) if only_child[0] else 0  # children follow at once as long as nothing branches
+    return first if first in parents else 0
 
 
 def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:
@@ -401,12 +436,9 @@ def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:
     more for millimetres, and anything else for centimetres. Wrong for a doll, a giant or a lone hand: say the unit.
     Bones above the first joint that branches (a reference joint, metres from the body) do not count.
     """
-    only_child = np.bincount(np.array(parents[1:], int), minlength=len(parents)) == 1
-    first = int(np.argmin(only_child)) if only_child[0] else 0  # children follow at once as long as nothing branches
-    first = first if first in parents else 0
     reach = np.zeros(len(parents))
     longest = 0.0
-    for j in range(len(parents) - 1, first, -1):
+    for j in range(len(parents) - 1, _first_branch(parents), -1):
         way = reach[j] + float(np.linalg.norm(offsets[j]))
         longest = max(longest, reach[parents[j]] + way)
         reach[parents[j]] = max(reach[parents[j]], way)

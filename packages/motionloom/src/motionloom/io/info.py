@@ -119,7 +119,7 @@ def _problems(motion: Motion, spans: Array, way: Array, height: float, floor: fl
     problems = []
     spans = np.median(spans, axis=0)
     if spans[2] > 2 * spans[1] and height > 0.5:
-        problems.append("the body lies or Z is up in the file (a person who stands is long in Y); --up z turns it")
+        problems.append("the body lies; if it should not, another axis is up in the file (--up z, --up x, --up y-down)")
     elif not 0.6 <= height <= 2.6:
         problems.append(f"the body is {height:.3g} m tall; if it is a person, give the file's unit with --unit")
     elif abs(floor) > 0.15:

@@ -22,7 +22,8 @@ Layout (version 1), for a motion of T frames and J joints:
 
 Those from ``translations`` on may be missing.
 
-An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints in metres and an ``fps`` is read too.
+An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints and an ``fps`` is read too. Such
+archives come in other units and with other axes up: what is surely not metres, or not +Y up, has to be told.
 """
 
 import io
@@ -44,6 +45,8 @@ from motionloom.errors import MotionloomError
 from motionloom.io import text
 from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
+from motionloom.retarget.anatomy import HUMAN_LEGS
+from motionloom.retarget.upright import leg_length, set_upright, upright_places
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 VERSION = 1
@@ -112,8 +115,13 @@ def _body_arrays(skeleton: Skeleton) -> dict[str, np.ndarray]:
     return arrays
 
 
-def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
-    """Read a motion; ``fps`` replaces the stored rate. Raises `MotionloomError` for anything but the layouts above."""
+def load_npz(path: Path | str, *, fps: float | None = None, unit: float | None = None, up: str | None = None) -> Motion:
+    """Read a motion; ``fps`` replaces the stored rate.
+
+    ``unit`` is metres per unit of positions, and ``up`` the axis of `motionloom.retarget.upright.AXES` that is up in
+    the file. Raises `MotionloomError` for anything but the layouts above, for a unit of the first of them, which is
+    in metres, and for positions that are surely not metres or not +Y up where these are None.
+    """
     file = _Archive(path, read_arrays(path))
     rate = fps
     if rate is None and "fps" in file:
@@ -123,8 +131,11 @@ def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
     if "rotations" in file:
         if rate is None:
             raise MotionloomError(f"{path} has no 'fps'; give the frame rate")
-        return _motion(file, rate)
-    return _from_positions(file, rate)
+        if unit is not None:
+            raise MotionloomError(f"{path} is in metres by its format; a unit is for positions without rotations")
+        motion = _motion(file, rate)
+        return motion if up is None else set_upright(motion, path, up)
+    return _from_positions(file, rate, unit=unit, up=up)
 
 
 def read_arrays(
@@ -334,7 +345,7 @@ def _body(file: _Archive, names: tuple[str, ...]) -> _Body:
     return body
 
 
-def _from_positions(file: _Archive, fps: float | None) -> Motion:
+def _from_positions(file: _Archive, fps: float | None, *, unit: float | None, up: str | None) -> Motion:
     name = next((n for n in _POSITIONS if n in file), None)
     if name is None:
         robot = "joint angles of a robot, which go with its model (docs/robots.md)"
@@ -347,4 +358,11 @@ def _from_positions(file: _Archive, fps: float | None) -> Motion:
         raise file.bad(f"'{name}' reaches {np.abs(places).max():g}; positions must be in metres")
     from motionloom.kinematics.ik import motion_from_positions
 
-    return motion_from_positions(places, fps)
+    places = places * (unit or 1.0)
+    leg = leg_length(places)
+    if unit is None and not HUMAN_LEGS[0] <= leg <= HUMAN_LEGS[1]:
+        raise file.bad(
+            f"the person's legs would be {leg:.3g} m long; say which unit '{name}' are in with --unit, such "
+            "as cm (--unit m takes them as they are)"
+        )
+    return motion_from_positions(upright_places(places, fps, file.path, up), fps)

@@ -14,6 +14,8 @@ from motionloom.kinematics.physics import ANKLES, TOES, Array, smooth, velocity
 
 UP = 0.12
 """Metres of the lowest joint over the floor from which on somebody is above it."""
+HIGH = 0.1
+"""Metres of the lowest joint over the floor from which on somebody is in the air, if it is for a second."""
 FLIGHT = 0.8
 """Seconds: nobody who jumps is in the air longer."""
 CLIMB = 0.3
@@ -127,6 +129,18 @@ def hovering(positions: np.ndarray, fps: float) -> list[tuple[int, int]]:
     for hold in footholds(p, fps):
         borne[hold.first : hold.end] = True
     return _lasting((_lowest(p) > UP) & ~borne, fps)
+
+
+def in_the_air(positions: np.ndarray, fps: float) -> list[tuple[int, int]]:
+    """Half-open ranges of frames, a second or longer, in which the lowest joint is over `HIGH` and nothing is under it.
+
+    positions: (frames, 22, 3) metres, the floor y = 0. Two steps of one height or more are something (`stairs`); a
+    seat or a bed is not: whoever wants one has to put it there.
+    """
+    p = np.asarray(positions, dtype=np.float64)
+    spans = [(first, end) for first, end in true_spans(_lowest(p) > HIGH) if end - first >= fps]
+    flight = stairs(p, fps) if spans else None
+    return spans if flight is None or flight.steps < 2 else []
 
 
 def falls_from_above(positions: np.ndarray, fps: float) -> bool:

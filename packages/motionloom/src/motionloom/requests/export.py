@@ -11,6 +11,7 @@ FORMATS = ("bvh", "glb", "npz", "mp4", "png", "html")
 ROOTS = ("motion", "hips", "in-place")
 HANDS = ("relaxed", "fist", "flat", "as-is")
 PLACES = ("character", "origin")
+UPS = ("y", "z", "x", "y-down", "z-down", "x-down")
 RATE = "frames per second"
 
 
@@ -49,7 +50,7 @@ class Stretch(Checked):
 class Source(Checked):
     """How a file is read."""
 
-    up: str | None = declare("word", "the axis that is up in the file; without it as people stand", words=("y", "z"))
+    up: str | None = declare("word", "the axis that is up in the file; without it as people move", words=UPS)
     source_fps: float | None = declare(
         "number", "take this many frames per second for the file's (AMC: 120)", low=0.1, high=1000, unit=RATE
     )

@@ -53,6 +53,8 @@ Array = NDArray[np.float64]
 
 _STEPPING = np.radians(25)
 """Flat feet of one body differ by less in how far their bones point down."""
+HUMAN_LEGS = (0.5, 1.3)
+"""Metres of thigh and shin, from a child's to a giant's."""
 BROADEST = 0.28
 """Human hip joints are at most so far apart, in lengths of the leg."""
 

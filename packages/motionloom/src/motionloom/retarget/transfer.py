@@ -21,6 +21,7 @@ from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.limbs import aim, bend_limb, placed, reach, read_shrug, shrug
 from motionloom.retarget.root import RootMode, place_root
+from motionloom.retarget.upright import up_of
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
@@ -170,7 +171,8 @@ def _y_up(motion: Motion, source: Body) -> Motion:
         return motion
     places = source.places(motion.positions(), motion.world_rotations())
     tall = (places[:, HEAD] - places[:, FEET].mean(axis=1)).mean(axis=0)
-    if float(tall @ source.up) < 2 * abs(float(tall[1])):
+    seen = up_of(places, motion.fps, source.leg, source.up)
+    if not seen.sure or seen.axis == "y" or float(tall @ source.up) < 2 * abs(float(tall[1])):
         return motion
     return motion.turned(rot.shortest_arc(source.up, np.eye(3)[1]))
 

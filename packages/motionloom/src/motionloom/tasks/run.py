@@ -26,7 +26,7 @@ from motionloom.tasks import control, duet, edit, long, pair, predict, reattempt
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
-from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated
+from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated, remarks_on_air
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -125,6 +125,8 @@ class Result:
     measures: dict[str, Any] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     """What was missed, a sentence each."""
+    aloft: list[str] = field(default_factory=list)
+    """Those of them that say that somebody is in the air."""
     notes: list[Remark] = field(default_factory=list)
     """Those of them that are about the words of a block."""
     about: Any = None
@@ -142,13 +144,15 @@ def run(plan: Plan, models: Models, progress: Progress = lambda calls, of: None)
     task, size = (_compose, plan.count) if is_batched(plan) else _TASKS[plan.task]
     size = 1 if plan.timeline is not None and plan.task == "duet" else size
     own, first = plan.task in ("predict", "switch", "duet"), plan.sampling.first
+    begin_s = 0.0
     for begin in range(0, plan.count, size):
         some = min(size, plan.count - begin)
         group = replace(plan, sampling=replace(plan.sampling, first=first + begin, count=some))
         moved = partial(_report_group, progress, begin, some, plan.count)
         for number, result in enumerate(task(group, models, moved), start=first + begin):
             seed = plan.sampling.seed + (0 if own else number)
-            yield close_loop(plan, models, replace(result, number=number, seed=seed))
+            yield _finished(plan, models, replace(result, number=number, seed=seed), begin_s)
+            begin_s += result.people[0].seconds if plan.in_pieces else 0.0
 
 
 def run_each(
@@ -162,7 +166,23 @@ def run_each(
     """
     models = models.adapted(plans[0].taught)
     for index, result in _run_rows(plans, models, progress):
-        yield index, close_loop(plans[index], models, result)
+        yield index, _finished(plans[index], models, result)
+
+
+def _finished(plan: Plan, models: Models, result: Result, begin_s: float = 0.0) -> Result:
+    """The result with its loop closed, and with a remark on whoever is in the air that nobody asked for.
+
+    begin_s: seconds at which it begins, where it is a piece of the motion.
+    """
+    result = close_loop(plan, models, result)
+    segments = plan.timeline.segments if plan.timeline else ()
+    goals = [*plan.goals, *(segment.goal for segment in segments)]
+    if any(goal is not None and goal.mask[..., 1].any() for goal in goals):
+        return result
+    lows = [float(np.percentile(joints22(one)[..., 1].min(axis=1), 5)) for one in plan.people]
+    texts = [plan.prompt, *(segment.text for segment in segments)]
+    aloft = remarks_on_air(result.people, texts, floor=max(lows, default=0.0), begin_s=begin_s)
+    return replace(result, remarks=[*result.remarks, *aloft], aloft=aloft)
 
 
 def is_batched(plan: Any) -> bool:

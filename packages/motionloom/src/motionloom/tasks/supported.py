@@ -13,13 +13,15 @@ from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
-from motionloom.kinematics.stairs import UP, falls_from_above, hovering
+from motionloom.kinematics.stairs import UP, falls_from_above, hovering, in_the_air
 from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
+from motionloom.retarget import joints22
 
 _CLIMB = re.compile(
     r"\b(?:(?:up|down)?stairs?|stairway|staircase|ladder|climb\w*|(?:up|down) (?:the|some|a few|a flight of) steps)\b"
 )
+_JUMP = re.compile(r"\b(?:jump|hop|leap)\w*")
 SUNK = 0.02
 """Metres by which a hand or the head may be under the floor."""
 REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
@@ -29,6 +31,27 @@ REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
 def climbs(texts: Iterable[str]) -> bool:
     """Whether some words are of stairs, of a ladder, or of climbing."""
     return any(_CLIMB.search(text.lower()) for text in texts)
+
+
+def remarks_on_air(
+    people: Sequence[Motion], texts: Sequence[str], *, floor: float = 0.0, begin_s: float = 0.0
+) -> list[str]:
+    """A sentence about each person who is in the air for a second or more, where the words are of no climb or jump.
+
+    people: of any humanoid skeleton; floor: metres of its height; begin_s: seconds at which the motions begin.
+    """
+    if climbs(texts) or any(_JUMP.search(text.lower()) for text in texts):
+        return []
+    remarks = []
+    for number, motion in enumerate(people, start=1):
+        places = joints22(motion) - np.array([0.0, floor, 0.0])
+        if spans := in_the_air(places, motion.fps):
+            whose = f"person {number}" if len(people) > 1 else "the person"
+            first, end = max(spans, key=lambda span: span[1] - span[0])
+            height = float(np.median(places[first:end, :, 1].min(axis=1)))
+            times = f"from {begin_s + first / motion.fps:.1f} to {begin_s + end / motion.fps:.1f} s"
+            remarks.append(f"{whose} is {height:.2f} m above the floor {times} with nothing underneath")
+    return remarks
 
 
 def is_elevated(motion: Motion) -> bool:
