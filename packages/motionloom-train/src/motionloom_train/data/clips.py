@@ -35,7 +35,7 @@ class Note:
     first: int
     last: int
     kind: str
-    """``human``, ``index``, ``action:`` or ``measured:`` and a name of `data.actions` or a label, or a measured label."""
+    """``human``, ``index``, ``action:`` or ``measured:`` and the name of an action or a label, or the label."""
     texts: tuple[str, ...] = ()
     """Sentences or verb phrases; empty for measured labels, whose wordings are in `data.words`."""
     core: tuple[int, int] | None = None

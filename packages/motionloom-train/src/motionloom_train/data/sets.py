@@ -2,6 +2,7 @@
 
 import functools
 import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +29,21 @@ def table() -> dict[str, dict[str, list[str]]]:
 
     ``action:NAME``, ``gesture:NAME`` or ``label:NAME`` to ``says``, and ``sided`` with ``{side}``.
     """
-    return read_table("motionloom_train.data", "sayings.toml")
+    sentences: dict[str, dict[str, list[str]]] = read_table("motionloom_train.data", "sayings.toml")
+    for group, idioms in read_table("motionloom_train.data", "idioms.toml").items():
+        row = sentences.setdefault(group, {})
+        rng = np.random.default_rng(zlib.crc32(group.encode()))
+        row["says"] = [*row.get("says", []), *idioms.get("says", []), *_worded_idioms(idioms.get("verbs", []), rng)]
+        row["sided"] = [*row.get("sided", []), *_worded_idioms(idioms.get("sided", []), rng)]
+    return sentences
+
+
+def _worded_idioms(verbs: Sequence[str], rng: np.random.Generator) -> list[str]:
+    return list(dict.fromkeys(sentence(verb, rng) for verb in verbs for _ in range(IDIOM_FORMS)))
+
+
+IDIOM_FORMS = 2
+"""Sentences of each idiom."""
 
 
 def sayings(note: Note) -> tuple[str, ...]:
