@@ -178,9 +178,9 @@ def _read(table: Mapping[str, Any]) -> tuple[Row, ...]:
     sets = {"$" + name: tuple(names) for name, names in table["sets"].items()}
     rows = []
     for entry in (*table["facts"], *table["undone"]):
-        entry = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
-        of = frozenset(name for part in entry.pop("of") for name in sets.get(part, (part,)))
-        rows.append(Row(of, **entry))
+        of = frozenset(name for part in entry["of"] for name in sets.get(part, (part,)))
+        rest: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items() if k != "of"}
+        rows.append(Row(of, **rest))
     return tuple(rows)
 
 
