@@ -42,7 +42,7 @@ def _worded_idioms(verbs: Sequence[str], rng: np.random.Generator) -> list[str]:
     return list(dict.fromkeys(sentence(verb, rng) for verb in verbs for _ in range(IDIOM_FORMS)))
 
 
-IDIOM_FORMS = 2
+IDIOM_FORMS = 3
 """Sentences of each idiom."""
 
 
