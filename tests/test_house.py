@@ -26,11 +26,11 @@ BUDGETS = {
     "io": 6_161,
     "goals": 6_015,
     "server": 5_359,
-    "train/data": 5_097,
+    "train/data": 5_536,
     "cli": 5_080,
     "lab/papers": 5_007,
     "bulk": 4_344,
-    "train/(top)": 4_318,
+    "train/(top)": 4_319,
     "lab/metrics": 3_494,
     "retarget": 3_002,
     "live": 2_919,
@@ -50,7 +50,7 @@ BUDGETS = {
     "diffusion": 1_108,
     "lab/bench": 926,
     "lab/cli": 309,
-    "train/cli": 297,
+    "train/cli": 298,
     "lab/(top)": 2,
 }
 """Canonical lines per room (`tools/measure_house.py`), of 2026-11-24. They only go down: a room that needs more says

@@ -23,6 +23,7 @@ from motionloom.weights.prior import (
 )
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.batches import FAVOUR, Batches
+from motionloom_train.data.clips import MEASURED
 from motionloom_train.data.sets import MotionSet, load_set
 from motionloom_train.loop import Average, Training
 from motionloom_train.modules import prior_module, prior_session
@@ -45,7 +46,7 @@ def known_table(motions: MotionSet, encoder: TextEncoder) -> Known:
     frames: dict[str, list[tuple[int, int]]] = {}
     texts: dict[str, dict[int, None]] = {}
     for item in motions.items:
-        name = item.group.removeprefix(PREFIX)
+        name = item.group.removeprefix(PREFIX).removeprefix(MEASURED)
         frames.setdefault(name, []).append((item.start, item.start + item.frames))
         texts.setdefault(name, {}).update(dict.fromkeys(item.texts))
     seconds = {group: _covered(spans) / FPS for group, spans in frames.items()}

@@ -1,5 +1,6 @@
 """What training is shown of a built set."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,9 +8,13 @@ import numpy as np
 import torch
 
 from motionloom.features import humanml as hml
+from motionloom.reading import read_table
+from motionloom_train.data.actions import ACTIONS
 from motionloom_train.data.batches import Batches, _starts
 from motionloom_train.data.clips import Clip, Note, write_clip
-from motionloom_train.data.sets import Item, load_set
+from motionloom_train.data.made import GESTURES
+from motionloom_train.data.sets import Item, load_set, table
+from motionloom_train.data.words import LABELS
 from tests.kinematics import people
 
 
@@ -167,3 +172,18 @@ def test_a_kick_by_nobody_knows_which_foot_keeps_all_its_words(tmp_path: Path) -
     texts = texts_of(tmp_path / "set", Note(0, 190, "action:kick", ("she kicks",)))
     assert "she kicks" in texts
     assert len(texts) > 5
+
+
+def test_idioms_are_for_what_is_known_and_become_sentences() -> None:
+    """Each group is an action, a gesture or a label; a side stays to be filled in only where there is one."""
+    known = {"action": ACTIONS, "gesture": GESTURES, "label": LABELS}
+    for group, row in read_table("motionloom_train.data", "idioms.toml").items():
+        kind, _, name = group.partition(":")
+        assert name in known[kind], group
+        assert row.keys() <= {"verbs", "sided", "says"}, group
+        said = table()[group]
+        assert not [text for text in said["says"] if "{" in text], group
+        assert all("{side}" in text for text in row.get("sided", ())), group
+        assert set(row.get("says", ())) <= set(said["says"]), group
+    naps = table()["action:lie down"]["says"]
+    assert any(re.search(r"tak\w+ a nap", text) for text in naps)

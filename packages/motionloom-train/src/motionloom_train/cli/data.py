@@ -27,6 +27,7 @@ def run_build(arguments: argparse.Namespace) -> None:
         mixed=arguments.mixed,
         exclude=arguments.exclude,
         allow=_reasons(arguments.allow),
+        corrections=arguments.corrections,
         find=import_module(READERS).find_takes,
     )
 

@@ -12,11 +12,12 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
 from motionloom.reading import read_table
 from motionloom_train.data.actions import PREFIX
-from motionloom_train.data.clips import GESTURE
+from motionloom_train.data.clips import GESTURE, MEASURED
 from motionloom_train.data.sets import Item, MotionSet
 
-SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
-"""How often a training sample shows a named action, a written caption, an index description, a measured label."""
+SHARE = {"action": 0.66, "human": 0.06, "index": 0.02, "label": 0.14, "measured": 0.12}
+"""How often a training sample shows a named action, a written caption, an index description, a measured label, and
+adverbs, counts and negations of what was measured (`data.measured`)."""
 
 _ROWS = read_table("motionloom_train.data", "favour.toml")
 FAVOUR: dict[str, float] = _ROWS["labels"] | {f"action:{name}": often for name, often in _ROWS["actions"].items()}
@@ -120,11 +121,11 @@ class Pool(NamedTuple):
 
     @staticmethod
     def of(items: Sequence[Item], window: int, favour: Mapping[str, float]) -> "Pool":
-        """The kind of text is sampled first (`SHARE`), then for actions and measured labels the group, evenly but for
-        ``favour``, then the item by its weight: rare actions are seen as often as walks."""
+        """The kind of text is sampled first (`SHARE`), then, but for captions and descriptions, the group, evenly but
+        for ``favour``, then the item by its weight: rare actions are seen as often as walks."""
         fitting: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(items):
-            kind = item.group if item.group in SHARE else "action" if item.group.startswith(PREFIX) else "label"
+            kind = _kind(item.group)
             if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
                 fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
         often: dict[int, float] = {}
@@ -178,6 +179,13 @@ class Ragged(NamedTuple):
         first, count = self.begins[rows], self.begins[rows + 1] - self.begins[rows]
         at = first + (rng.random(len(rows)) * count).astype(np.int64)
         return self.values[np.minimum(at, len(self.values) - 1)], count > 0
+
+
+def _kind(group: str) -> str:
+    """The entry of `SHARE` that a group of items belongs to."""
+    starts = {PREFIX: "action", MEASURED: "measured"}
+    named = next((kind for start, kind in starts.items() if group.startswith(start)), "label")
+    return group if group in SHARE else named
 
 
 def _favour(name: str, favour: Mapping[str, float]) -> float:

@@ -32,7 +32,8 @@ from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment, gate
 from motionloom_train.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to
 from motionloom_train.data.augment import find_idle
-from motionloom_train.data.clips import SHORTEST, Clip, Note, read_clip, write_clip
+from motionloom_train.data.clips import MEASURED, SHORTEST, Clip, Note, read_clip, write_clip
+from motionloom_train.data.corrections import read_corrections
 from motionloom_train.data.derived import (
     LOOPED,
     SEATED,
@@ -47,6 +48,7 @@ from motionloom_train.data.derived import (
     there_and_back,
 )
 from motionloom_train.data.made import hands_up
+from motionloom_train.data.measured import measured_notes
 from motionloom_train.data.person import uniform_person
 from motionloom_train.data.progress import Say
 from motionloom_train.data.sources import Places, Span, Take, find_takes
@@ -123,10 +125,13 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
             notes.append(Note(first, last, span.kind, span.texts))
             notes += _action_notes(span, features[first:last], first, name=take.name)
     words = " | ".join(text for span in take.spans for text in span.texts)
-    windows = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, words)
+    positions = hml.decode_positions(features.astype(np.float64))
+    windows = label_clip(positions, FPS, words)
     if way == "bent":  # somebody who stands is turned like a statue
         windows = [(a, b, label) for a, b, label in windows if not label.startswith("turn ")]
+    done = [(n.first, n.last, n.kind.removeprefix(PREFIX)) for n in notes if n.kind.startswith(PREFIX)]
     notes += [Note(a, b, label) for a, b, label in join_spans(windows)]
+    notes += measured_notes(positions, FPS, [*windows, *done])
     suffix = "" if way == "plain" else f"_{way}"
     return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features, take.kind)
 
@@ -183,6 +188,19 @@ _OTHER_LABEL = {
 _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
 
 
+_SIDED = {*_OTHER_LABEL, "kick", "punch", "hop", "wave"}
+"""What is shown with the right side, or to the left, where no side is said."""
+
+
+def _mirrored(note: Note) -> Note:
+    """A note of the mirror image; perhaps without texts."""
+    start = MEASURED if note.kind.startswith(MEASURED) else ""
+    name, texts = note.kind.removeprefix(start), _mirrored_texts(note)
+    if start and name in _SIDED:
+        texts = tuple(new for new, old in zip(texts, note.texts, strict=True) if new != old)
+    return replace(note, kind=start + _OTHER_LABEL.get(name, name), texts=texts)
+
+
 def _mirrored_texts(note: Note) -> tuple[str, ...]:
     action = ACTIONS.get(note.kind.removeprefix(PREFIX))
     if action and action.turns:  # words for a turn to the left do not fit one to the right
@@ -195,11 +213,8 @@ PHASED = {PREFIX + name for name, action in ACTIONS.items() if action.phase}
 
 def _with_mirror(clip: Clip) -> Iterator[Clip]:
     yield clip
-    notes = tuple(
-        replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=_mirrored_texts(n))
-        for n in clip.notes
-        if not (n.kind in PHASED and n.core)
-    )
+    notes = tuple(_mirrored(n) for n in clip.notes if not (n.kind in PHASED and n.core))
+    notes = tuple(n for n in notes if n.texts or not n.kind.startswith(MEASURED))
     yield replace(clip, name="M" + clip.name, notes=notes, features=hml.mirror(clip.features))
 
 
@@ -219,6 +234,8 @@ class Job:
     find: Finder
     allowed: str = ""
     """Why the take may come in though its body is not that of the recording."""
+    corrections: str = ""
+    """File of the table of `data.corrections`; empty: captions stay as they are."""
 
 
 _takes: dict[tuple[str, str], dict[str, Take]] = {}
@@ -234,7 +251,9 @@ def _prepare(job: Job) -> tuple[str, str]:
         gate.admit(out, job.name, places, clip, allowed=job.allowed)
 
     try:
-        for clip in clips_of(_takes[key][job.name], check=check):
+        take = _takes[key][job.name]
+        take = read_corrections(job.corrections).take(take) if job.corrections else take
+        for clip in clips_of(take, check=check):
             write_clip(out / "clips", clip)
     except MotionloomError as error:
         reason = str(error)
@@ -252,6 +271,7 @@ def build(
     mixed: int = 700,
     exclude: Sequence[str] = (),
     allow: Mapping[str, str] = MappingProxyType({}),
+    corrections: Path | str | None = None,
     find: Finder = find_takes,
     progress: Say = print,
 ) -> Path:
@@ -261,13 +281,16 @@ def build(
 
     exclude: takes whose names begin with one of these are left out, and so are all clips derived from them.
     allow: beginnings of names of takes that come in all the same, and why.
+    corrections: a table of what captions become (`data.corrections`).
     find: what finds the takes of a folder.
     """
     out = Path(out)
+    if corrections is not None:
+        read_corrections(corrections)  # before any work is done
     if workers < 1 or mixed < 0:
         raise MotionloomError(f"at least 1 worker and 0 mixed clips are needed; got {workers} and {mixed}")
     jobs = list(_jobs(folders, captions, out, find=find, progress=progress))
-    jobs = _allowing(_without(jobs, exclude), allow)
+    jobs = [replace(job, corrections=str(corrections or "")) for job in _allowing(_without(jobs, exclude), allow)]
     if (out / "done").exists() and not (out / gate.FOLDER).exists():
         raise MotionloomError(f"{out} is of a version that did not look at bodies; build into another folder")
     for part in ("clips", gate.FOLDER, "done"):

@@ -23,6 +23,8 @@ SHORTEST = 20
 """Frames of the shortest stretch that is described."""
 THEN, GESTURE = "then", "made "
 """Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
+MEASURED = "measured:"
+"""What the kind of a note begins with whose words are measured in its frames (`data.measured`)."""
 KINDS = ("capture", "keyed", "made")
 
 
@@ -33,7 +35,7 @@ class Note:
     first: int
     last: int
     kind: str
-    """``human``, ``index``, ``action:`` and a name of `data.actions`, or the measured label."""
+    """``human``, ``index``, ``action:`` or ``measured:`` and the name of an action or a label, or the label."""
     texts: tuple[str, ...] = ()
     """Sentences or verb phrases; empty for measured labels, whose wordings are in `data.words`."""
     core: tuple[int, int] | None = None
@@ -112,7 +114,7 @@ def _check_clip(clip: Clip) -> None:
 def _check_note(note: Note, frames: int) -> None:
     if not 0 <= note.first < note.last <= frames:
         raise ValueError(f"a note spans frames {note.first} to {note.last} of {frames}")
-    verbal = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
+    verbal = note.kind in ("human", "index") or note.kind.startswith((PREFIX, MEASURED))
     if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
         raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
     if not all(isinstance(t, str) for t in note.texts) or (verbal and not note.texts):

@@ -2,6 +2,7 @@
 
 import functools
 import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from motionloom.io.text import parse_json, read_utf8
 from motionloom.reading import read_table
 from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
-from motionloom_train.data.clips import GESTURE, Clip, Note, read_clip
+from motionloom_train.data.clips import GESTURE, MEASURED, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
 from motionloom_train.data.words import EVENTS, STATES, phrases, sentence
 
@@ -28,7 +29,21 @@ def table() -> dict[str, dict[str, list[str]]]:
 
     ``action:NAME``, ``gesture:NAME`` or ``label:NAME`` to ``says``, and ``sided`` with ``{side}``.
     """
-    return read_table("motionloom_train.data", "sayings.toml")
+    sentences: dict[str, dict[str, list[str]]] = read_table("motionloom_train.data", "sayings.toml")
+    for group, idioms in read_table("motionloom_train.data", "idioms.toml").items():
+        row = sentences.setdefault(group, {})
+        rng = np.random.default_rng(zlib.crc32(group.encode()))
+        row["says"] = [*row.get("says", []), *idioms.get("says", []), *_worded_idioms(idioms.get("verbs", []), rng)]
+        row["sided"] = [*row.get("sided", []), *_worded_idioms(idioms.get("sided", []), rng)]
+    return sentences
+
+
+def _worded_idioms(verbs: Sequence[str], rng: np.random.Generator) -> list[str]:
+    return list(dict.fromkeys(sentence(verb, rng) for verb in verbs for _ in range(IDIOM_FORMS)))
+
+
+IDIOM_FORMS = 3
+"""Sentences of each idiom."""
 
 
 def sayings(note: Note) -> tuple[str, ...]:
@@ -66,7 +81,7 @@ class Item:
     """First frame in `MotionSet.features`."""
     frames: int
     group: str
-    """``human``, ``index``, ``action:NAME`` or the measured label."""
+    """``human``, ``index``, ``action:NAME``, ``measured:NAME`` or the measured label."""
     texts: tuple[int, ...]
     """Numbers of its sentences in `MotionSet.texts`."""
     core: tuple[int, int] | None = None
@@ -155,7 +170,7 @@ def _worded(
     note: Note, texts: dict[str, int], wordings: dict[str, tuple[int, ...]], rng: np.random.Generator
 ) -> tuple[int, ...]:
     """Numbers of a note's captions in ``texts``, which grows; ``wordings`` are those of the labels met so far."""
-    if note.kind == "human" or note.kind.startswith(PREFIX):
+    if note.kind == "human" or note.kind.startswith((PREFIX, MEASURED)):
         return tuple(_number(texts, text) for text in _of_its_side(note, (*note.texts, *sayings(note))))
     if note.kind == "index":
         return tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
@@ -196,7 +211,8 @@ def _when(
 
 
 def _is_event(note: Note) -> bool:
-    return note.kind not in ("human", "index", *STATES) and "+" not in note.kind and not note.kind.startswith(PREFIX)
+    named = note.kind.startswith((PREFIX, MEASURED))
+    return note.kind not in ("human", "index", *STATES) and "+" not in note.kind and not named
 
 
 def _moments(clip: Clip, note: Note) -> list[tuple[int, int]]:

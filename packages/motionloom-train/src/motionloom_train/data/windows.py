@@ -23,7 +23,7 @@ Measures = dict[str, float]
 _ANKLES, _FEET, _WRISTS, _SHOULDERS, _HIPS = [7, 8], [7, 8, 10, 11], [20, 21], [16, 17], [1, 2]
 
 
-def _measure(p: Array, fps: float) -> Measures:
+def measure(p: Array, fps: float) -> Measures:
     smooth = ph.smooth(p, 3)
     velocity = ph.velocity(smooth, fps)
     body = ph.in_body(smooth)
@@ -139,7 +139,7 @@ class Rule(NamedTuple):
     labels: str
     """The names it gets, with commas; none where a window like this has no name."""
     measures: str
-    """Comparisons with commas, all of which must hold: of `_measure`'s numbers and those of `_compared`."""
+    """Comparisons with commas, all of which must hold: of `measure`'s numbers and those of `compare`."""
     words: tuple[str, ...] = ()
     """Patterns, each of which the clip's text must hold."""
     without: str = ""
@@ -154,7 +154,7 @@ class Rule(NamedTuple):
         return (
             all(re.search(pattern, words) for pattern in self.words)
             and not (self.without and re.search(self.without, words))
-            and all(is_so(compared[name], number) for name, is_so, number in _comparisons(self.measures))
+            and all(is_so(compared[name], number) for name, is_so, number in comparisons(self.measures))
         )
 
 
@@ -162,7 +162,7 @@ _OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": opera
 
 
 @functools.cache
-def _comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], float], ...]:
+def comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], float], ...]:
     parts = (part.split() for part in text.split(",") if part)
     return tuple((name, _OPERATORS[sign], float(number)) for name, sign, number in parts)
 
@@ -187,16 +187,16 @@ of the last names where a window without a gesture goes."""
 
 def label_window(positions: Array, fps: float, text: str) -> list[str]:
     """Labels of one window. ``positions`` (frames, 22, 3) metres, floor near 0; ``text``: all the clip's own words."""
-    return labels_of(_measure(positions, fps), len(positions) / fps, text)
+    return labels_of(measure(positions, fps), len(positions) / fps, text)
 
 
 def labels_of(measures: Measures, seconds: float, text: str) -> list[str]:
     """Labels of a window that measures so and lasts so long, by the rules above."""
-    compared, words = _compared(measures, seconds), text.lower()
+    compared, words = compare(measures, seconds), text.lower()
     return _first(ALONE, compared, words) or _every(GESTURES, compared, words) or _first(PATHS, compared, words)
 
 
-def _compared(m: Measures, seconds: float) -> Measures:
+def compare(m: Measures, seconds: float) -> Measures:
     """The measures, and what rules need of two of them: degrees of turn, metres per second, metres too far ahead."""
     off_place = abs(m["advance"]) - 0.15 * seconds
     return {**m, "turned": abs(m["turn"]), "speed": m["travel"] / seconds, "off_place": off_place}

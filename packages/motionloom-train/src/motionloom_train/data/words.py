@@ -43,7 +43,8 @@ def mirror_text(text: str) -> str:
 _WORDS = read_table("motionloom_train.data", "phrases.toml")
 LABELS: dict[str, tuple[str, ...]] = {label: tuple(verbs) for label, verbs in _WORDS["labels"].items()}
 """Verb phrases for what a window measurably shows; see `data.windows`."""
-_PEOPLE: list[str] = _WORDS["people"]
+PEOPLE: list[str] = _WORDS["people"]
+"""Who does it; each as often as it is drawn."""
 STATES, POSTURES = tuple(_WORDS["states"]), tuple(_WORDS["postures"])
 """Labels that stay true however long a window is; actions that end in a posture which people keep."""
 EVENTS: dict[str, str] = _WORDS["events"]
@@ -52,7 +53,7 @@ EVENTS: dict[str, str] = _WORDS["events"]
 
 def sentence(verb_phrase: str, rng: np.random.Generator) -> str:
     """Put a subject before a verb phrase in the third person, or make a command, a gerund or "who is ...ing" of it."""
-    form, who = rng.random(), _PEOPLE[rng.integers(len(_PEOPLE))]
+    form, who = rng.random(), PEOPLE[rng.integers(len(PEOPLE))]
     if form < 0.12 and not verb_phrase.startswith("is "):
         return imperative(verb_phrase)
     if form < 0.28:
