@@ -1,0 +1,131 @@
+"""Training clips of people who move in a manner (`data.manners`): the same recordings, limping, marching, sneaking."""
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.physics import Array
+from motionloom_train.data.actions import PREFIX
+from motionloom_train.data.augment import NO_IDLE, Idle, extended
+from motionloom_train.data.clips import MANNER, Clip, Note
+from motionloom_train.data.manner_measures import measure
+from motionloom_train.data.manners import MANNERS, Manner, put_on
+from motionloom_train.data.person import at_origin
+from motionloom_train.data.windows import Rule
+from motionloom_train.data.words import sentence
+
+BODIES = {"walk": ("walk", "walk slow", "walk fast"), "run": ("jog", "run"), "stand": ("stand",)}
+"""Measured labels of those who walk, run and stand."""
+STRENGTHS = (0.75, 1.0, 1.3)
+SHORTEST, LONGEST = 60, 160
+"""Frames that are taken of a recording."""
+_OTHERWISE = re.compile(
+    r"skip|hop|leap|box|zombie|crouch|hurt|guard|shoot|hang|drunk|\bold|limp|march|sneak|tired|sad\b|happy|angry|stealth"
+    r"|careful|creep|carry|object|uneven|stairs|climb|danc|jump|bow|back|float|levitat|moonwalk|stumbl|sway|swing|strange",
+)
+"""What a recording has in its name or captions that is in a manner already."""
+_SUNK = 0.004
+"""Metres by which a kept clip is in the floor at most, on average."""
+
+
+def person_of(name: str) -> str:
+    """Who was recorded in a clip, by its name: CMU's subject number, ACCAD's actor, else the first part of the name."""
+    made = re.search(r"_of_(.+?)(_\d+)?$", name)
+    if made:
+        return made[1]
+    name = name.removeprefix("M")
+    found = re.match(r"(?:cmu_)?(\d{2,3})_|(accad_[A-Za-z]+\d)_|(acf)_|(ui_m\d+_s\d+)", name)
+    return next(part for part in found.groups() if part) if found else name.split("_")[0]
+
+
+def mannered_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = NO_IDLE) -> Iterator[Clip]:
+    """People in every manner, at three strengths; training clips of one licence. About a fifteenth of ``count`` each.
+
+    The people take turns, so that a manner is that of many. A clip that does not measure as its manner must is not kept.
+    """
+    bodies = {on: _bodies(clips, labels) for on, labels in BODIES.items()}
+    for order, manner in enumerate(MANNERS.values()):
+        rng = np.random.default_rng((seed, order))
+        wanted, total = round(count / 15), 0
+        for number in range(2 * wanted):
+            if total == wanted:
+                break
+            on = _body_kind(manner, number)
+            people = bodies[on]
+            if not people:
+                continue
+            names = sorted(people)
+            clip, note = _pick(people[names[(number + order) % len(names)]], rng)
+            side = ("right", "left")[number // 2 % 2] if manner.sided else "right"
+            strength = STRENGTHS[int(rng.integers(len(STRENGTHS)))]
+            places = put_on(_stretch(clip, note, on, rng), manner, fps=FPS, rng=rng, strength=strength, side=side)
+            if not shows(manner, places, on):
+                continue
+            features = hml.encode(at_origin(places[:200]), heading="corrected").astype(np.float32)
+            texts = words_of(manner, on, side, rng)
+            notes = (Note(0, len(features), PREFIX + MANNER + manner.name, texts),)
+            name = f"manner_{seed}_{manner.name.replace(' ', '_')}_{total:03d}_of_{person_of(clip.name)}"
+            yield Clip(name, clip.source, clip.licence, "train", "made", notes, features, "made")
+            total += 1
+
+
+def _body_kind(manner: Manner, number: int) -> str:
+    """What the body does of the clip of this number: mostly what comes first, every fourth what else there is."""
+    others = manner.on[1:]
+    return others[number // 4 % len(others)] if others and number % 4 == 3 else manner.on[0]
+
+
+def _bodies(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:
+    """Recordings in no manner, by person."""
+    people: dict[str, list[tuple[Clip, Note]]] = {}
+    for clip in clips:
+        if clip.split != "train" or clip.way not in ("plain", "looped") or clip.kind == "keyed" or clip.name[0] == "M":
+            continue
+        words = " ".join([clip.name, *(text for note in clip.notes for text in note.texts)]).lower()
+        if _OTHERWISE.search(words):
+            continue
+        for note in clip.notes:
+            if note.kind in labels and note.last - note.first >= SHORTEST:
+                people.setdefault(person_of(clip.name), []).append((clip, note))
+    return people
+
+
+def _pick(some: list[tuple[Clip, Note]], rng: np.random.Generator) -> tuple[Clip, Note]:
+    return some[int(rng.integers(len(some)))]
+
+
+def _stretch(clip: Clip, note: Note, on: str, rng: np.random.Generator) -> Array:
+    length = min(note.last - note.first, LONGEST)
+    first = note.first + int(rng.integers(note.last - note.first - length + 1))
+    places = at_origin(clip.positions(first, first + length))
+    return extended(places, 120) if on == "stand" and len(places) < 120 else places
+
+
+def is_handed(clip: Clip) -> bool:
+    """Whether the clip's manner has a hand for each thing, so that its mirror image would be of another."""
+    return any(
+        n.kind.startswith(PREFIX + MANNER) and MANNERS[n.kind[len(PREFIX + MANNER) :]].handed for n in clip.notes
+    )
+
+
+def shows(manner: Manner, places: Array, on: str) -> bool:
+    """Whether (frames, 22, 3) metres measure as the manner of who does ``on`` must, and stand on the floor."""
+    if len(places) < SHORTEST / 2 or not np.isfinite(places).all() or ph.penetration(places) > _SUNK:
+        return False
+    return on != manner.on[0] or Rule("", manner.measures).holds(measure(places, FPS), "")
+
+
+def words_of(manner: Manner, on: str, side: str, rng: np.random.Generator) -> tuple[str, ...]:
+    """Some twenty-five sentences for the manner; of the left leg or hand only what names it, as in `data.sets`."""
+    phrases = list(manner.says[on])
+    named = [phrase.format(side=side) for phrase in manner.sided] if on == "walk" else []
+    if manner.sided and side == "left":
+        phrases = named
+    texts = [sentence(phrase, rng) for phrase in [*phrases, *named]]
+    if on == manner.on[0] and not (manner.sided and side == "left"):
+        texts += manner.lines
+    return tuple(dict.fromkeys(texts))
