@@ -1,7 +1,9 @@
 """What shows a manner, in numbers: steps, feet, posture, arms. Of windows of some seconds, of anybody.
 
-Angles in degrees, lengths in metres of the uniform person, times in seconds. ``l`` and ``r`` are the left and the right.
+Degrees, metres of the uniform person, seconds. ``l`` and ``r`` are the left and the right side.
 """
+
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,8 +45,8 @@ def _steps(p: Array, body: Array, fps: float) -> Measures:
             at = ph.turned((p[a:b, ankle] + p[a:b, toes]).mean(axis=0) / 2 - path[m], facing[m])
             holds.append((m / fps, i, at[0] * (1 - 2 * i), (p[m, toes] * [1, 0, 1])))
     holds.sort(key=lambda each: each[0])
-    gaps = np.array([b[0] - a[0] for a, b in zip(holds, holds[1:]) if a[1] != b[1]] or [seconds])
-    lengths = np.array([np.linalg.norm(b[3] - a[3]) for a, b in zip(holds, holds[1:]) if a[1] != b[1]] or [0.0])
+    gaps = np.array([b[0] - a[0] for a, b in pairwise(holds) if a[1] != b[1]] or [seconds])
+    lengths = np.array([np.linalg.norm(b[3] - a[3]) for a, b in pairwise(holds) if a[1] != b[1]] or [0.0])
     widths = np.array([each[2] for each in holds] or [0.1])
     whole = [[(b - a) / fps for a, b in each if a > 0 and b < len(p)] for each in spans]
     stance = [float(np.median(each)) if each else 0.6 for each in whole]

@@ -28,6 +28,8 @@ _OTHERWISE = re.compile(
     r"|careful|creep|carry|object|uneven|stairs|climb|danc|jump|bow|back|float|levitat|moonwalk|stumbl|sway|swing|strange",
 )
 """What a recording has in its name or captions that is in a manner already."""
+_ALIVE = 0.02
+"""Metres per second that the joints of those who stand move on average at least: less is a statue."""
 _SUNK = 0.004
 """Metres by which a kept clip is in the floor at most, on average."""
 
@@ -45,7 +47,7 @@ def person_of(name: str) -> str:
 def mannered_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = NO_IDLE) -> Iterator[Clip]:
     """People in every manner, at three strengths; training clips of one licence. About a fifteenth of ``count`` each.
 
-    The people take turns, so that a manner is that of many. A clip that does not measure as its manner must is not kept.
+    The people take turns, so that a manner is that of many. A clip that does not measure as its manner must is dropped.
     """
     bodies = {on: _bodies(clips, labels) for on, labels in BODIES.items()}
     for order, manner in enumerate(MANNERS.values()):
@@ -89,9 +91,13 @@ def _bodies(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tupl
         if _OTHERWISE.search(words):
             continue
         for note in clip.notes:
-            if note.kind in labels and note.last - note.first >= SHORTEST:
+            if note.kind in labels and note.last - note.first >= SHORTEST and _is_alive(clip, note):
                 people.setdefault(person_of(clip.name), []).append((clip, note))
     return people
+
+
+def _is_alive(clip: Clip, note: Note) -> bool:
+    return float(np.linalg.norm(ph.velocity(clip.positions(note.first, note.last), FPS), axis=-1).mean()) > _ALIVE
 
 
 def _pick(some: list[tuple[Clip, Note]], rng: np.random.Generator) -> tuple[Clip, Note]:

@@ -1,11 +1,12 @@
 """Manners of moving put on recorded people: the same person who limps, marches, tiptoes, sneaks, is drunk or cold.
 
-A manner is a row of ``manners.toml``: changes of time, footholds, feet, pelvis, trunk and arms, as amounts that grow with
-a strength. They are kinematic: stances move as rigid wholes (`data.gait`), knees follow in closed form, what the person
-does besides stays. Each row cites what the literature measured, and `data.manner_measures` checks it on every clip.
+A manner is a row of ``manners.toml``: changes of time, footholds, feet, pelvis, trunk and arms, as amounts that grow
+with a strength. They are kinematic: stances move as rigid wholes (`data.gait`), knees follow in closed form, what the
+person does besides stays. Each row cites what the literature measured, and `data.manner_measures` checks every clip.
 """
 
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -90,18 +91,14 @@ class Manner:
 
 
 def _read() -> dict[str, Manner]:
-    rows = read_table("motionloom_train.data", "manners.toml")
+    rows: dict[str, dict[str, Any]] = read_table("motionloom_train.data", "manners.toml")
     manners = {}
     for name, row in rows.items():
-        row = dict(row)
-        row.pop("literature")
+        row = {key: float(v) if type(v) in (int, float) else v for key, v in row.items() if key != "literature"}
         says = {on: tuple(row.pop(on)) for on in ("walk", "run", "stand") if on in row}
         hands = {side: tuple(map(tuple, row.pop(side))) for side in _NAMES if side in row}
-        numbers = {
-            key: float(v) if isinstance(v, int | float) and not isinstance(v, bool) else v for key, v in row.items()
-        }
-        words = {key: tuple(numbers.pop(key, ())) for key in ("lines", "sided")}
-        manners[name] = Manner(name, tuple(says), says, **words, **numbers, **hands)
+        words = {key: tuple(row.pop(key, ())) for key in ("lines", "sided")}
+        manners[name] = Manner(name, tuple(says), says, **words, **row, **hands)
     return manners
 
 
@@ -166,7 +163,7 @@ def _rate(gait: Gait, manner: Manner, side: str, rng: np.random.Generator) -> Ar
     if manner.uneven:
         rate = rate * np.exp(manner.uneven * _Noise(len(rate), gait.fps, rng).curve(0.3, 1.1))
     if manner.stamp:  # a stamping foot hangs in the air and comes down fast
-        for i, (start, stop) in ((i, s) for i in (0, 1) for s in gait.spans[i]):
+        for start, _ in (*gait.spans[0], *gait.spans[1]):
             rate[max(start - 3, 0) : start + 1] *= 1 + 0.5 * manner.stamp
             rate[max(start - 8, 0) : max(start - 4, 0)] *= 1 - 0.25 * manner.stamp
     return rate.clip(0.3, 2.5)
@@ -215,9 +212,9 @@ def _stepped(gait: Gait, manner: Manner, side: str, noise: _Noise) -> tuple[Arra
 
 
 def _feet(gait: Gait, feet: list[Array], manner: Manner, side: str) -> list[Array]:
-    """Heels, soles and clearance: the feet as `_stepped` places them, (frames, 2, 3) each, rolling as the manner does."""
+    """Heels, soles and clearance: (frames, 2, 3) each, as `_stepped` places them, rolling otherwise."""
     result = []
-    for i, (foot, (_, _, ankle, toes, outward)) in enumerate(zip(feet, FEET)):
+    for i, (foot, (_, _, _, toes, outward)) in enumerate(zip(feet, FEET)):
         hurt = manner.hurt if _NAMES[i] == side else 0.0
         ahead = foot[:, 1] - foot[:, 0]
         level = limbs.unit(ahead * [1, 0, 1])
@@ -258,7 +255,7 @@ def _air(gait: Gait, i: int) -> Array:
     """(frames,) 0 while the foot stands, 1 in the middle of its swing, smooth."""
     result = np.zeros(len(gait.places))
     spans = gait.spans[i]
-    for (_, first), (last, _) in zip(spans, spans[1:]):
+    for (_, first), (last, _) in pairwise(spans):
         count = last - first + 2
         result[first - 1 : last + 1] = np.sin(np.pi * np.arange(count) / (count - 1)).clip(0) ** 0.6
     if spans:  # swings at either end, of which one half is seen
