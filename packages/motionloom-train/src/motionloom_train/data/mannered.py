@@ -10,7 +10,7 @@ from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.actions import PREFIX
-from motionloom_train.data.augment import NO_IDLE, Idle, extended
+from motionloom_train.data.augment import NO_IDLE, Idle
 from motionloom_train.data.clips import MANNER, Clip, Note
 from motionloom_train.data.manner_measures import measure
 from motionloom_train.data.manners import MANNERS, Manner, put_on
@@ -18,18 +18,18 @@ from motionloom_train.data.person import at_origin
 from motionloom_train.data.windows import Rule
 from motionloom_train.data.words import sentence
 
-BODIES = {"walk": ("walk", "walk slow", "walk fast"), "run": ("jog", "run"), "stand": ("stand",)}
-"""Measured labels of those who walk, run and stand."""
+BODIES = {"walk": ("walk", "walk slow", "walk fast"), "run": ("jog", "run")}
+"""Measured labels of those who walk and run. Those who stand are `augment.Idle`'s."""
 STRENGTHS = (0.75, 1.0, 1.3)
-SHORTEST, LONGEST = 60, 160
-"""Frames that are taken of a recording."""
+SHORTEST, LONGEST, MOST = 60, 160, 200
+"""Frames that are taken of a recording, and that a clip has at most."""
+STANDS = "somebody"
+"""Who it is that stands: stretches of `Idle` have no names."""
 _OTHERWISE = re.compile(
     r"skip|hop|leap|box|zombie|crouch|hurt|guard|shoot|hang|drunk|\bold|limp|march|sneak|tired|sad\b|happy|angry|stealth"
     r"|careful|creep|carry|object|uneven|stairs|climb|danc|jump|bow|back|float|levitat|moonwalk|stumbl|sway|swing|strange",
 )
 """What a recording has in its name or captions that is in a manner already."""
-_ALIVE = 0.02
-"""Metres per second that the joints of those who stand move on average at least: less is a statue."""
 _SUNK = 0.004
 """Metres by which a kept clip is in the floor at most, on average."""
 
@@ -54,23 +54,19 @@ def mannered_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle 
         rng = np.random.default_rng((seed, order))
         wanted, total = round(count / 15), 0
         for number in range(2 * wanted):
-            if total == wanted:
-                break
             on = _body_kind(manner, number)
-            people = bodies[on]
-            if not people:
+            found = _standing(clips, idle, rng) if on == "stand" else _moving(bodies[on], number + order, rng)
+            if total == wanted or found is None:
                 continue
-            names = sorted(people)
-            clip, note = _pick(people[names[(number + order) % len(names)]], rng)
+            clip, body, person = found
             side = ("right", "left")[number // 2 % 2] if manner.sided else "right"
             strength = STRENGTHS[int(rng.integers(len(STRENGTHS)))]
-            places = put_on(_stretch(clip, note, on, rng), manner, fps=FPS, rng=rng, strength=strength, side=side)
+            places = put_on(body, manner, fps=FPS, rng=rng, strength=strength, side=side)
             if not shows(manner, places, on):
                 continue
-            features = hml.encode(at_origin(places[:200]), heading="corrected").astype(np.float32)
-            texts = words_of(manner, on, side, rng)
-            notes = (Note(0, len(features), PREFIX + MANNER + manner.name, texts),)
-            name = f"manner_{seed}_{manner.name.replace(' ', '_')}_{total:03d}_of_{person_of(clip.name)}"
+            features = hml.encode(at_origin(places[:MOST]), heading="corrected").astype(np.float32)
+            notes = (Note(0, len(features), PREFIX + MANNER + manner.name, words_of(manner, on, side, rng)),)
+            name = f"manner_{seed}_{manner.name.replace(' ', '_')}_{total:03d}_of_{person}"
             yield Clip(name, clip.source, clip.licence, "train", "made", notes, features, "made")
             total += 1
 
@@ -87,28 +83,37 @@ def _bodies(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tupl
     for clip in clips:
         if clip.split != "train" or clip.way not in ("plain", "looped") or clip.kind == "keyed" or clip.name[0] == "M":
             continue
-        words = " ".join([clip.name, *(text for note in clip.notes for text in note.texts)]).lower()
-        if _OTHERWISE.search(words):
+        if not is_plain(clip):
             continue
         for note in clip.notes:
-            if note.kind in labels and note.last - note.first >= SHORTEST and _is_alive(clip, note):
+            if note.kind in labels and note.last - note.first >= SHORTEST:
                 people.setdefault(person_of(clip.name), []).append((clip, note))
     return people
 
 
-def _is_alive(clip: Clip, note: Note) -> bool:
-    return float(np.linalg.norm(ph.velocity(clip.positions(note.first, note.last), FPS), axis=-1).mean()) > _ALIVE
+def is_plain(clip: Clip) -> bool:
+    """Whether neither the name nor the captions of a recording say that somebody moves in a manner or does more."""
+    return not _OTHERWISE.search(" ".join([clip.name, *(text for note in clip.notes for text in note.texts)]).lower())
 
 
-def _pick(some: list[tuple[Clip, Note]], rng: np.random.Generator) -> tuple[Clip, Note]:
-    return some[int(rng.integers(len(some)))]
-
-
-def _stretch(clip: Clip, note: Note, on: str, rng: np.random.Generator) -> Array:
+def _moving(
+    people: dict[str, list[tuple[Clip, Note]]], turn: int, rng: np.random.Generator
+) -> tuple[Clip, Array, str] | None:
+    """A recording of the person whose turn it is, (frames, 22, 3) metres of it, and the person."""
+    if not people:
+        return None
+    person = sorted(people)[turn % len(people)]
+    clip, note = people[person][int(rng.integers(len(people[person])))]
     length = min(note.last - note.first, LONGEST)
     first = note.first + int(rng.integers(note.last - note.first - length + 1))
-    places = at_origin(clip.positions(first, first + length))
-    return extended(places, 120) if on == "stand" and len(places) < 120 else places
+    return clip, at_origin(clip.positions(first, first + length)), person
+
+
+def _standing(clips: Sequence[Clip], idle: Idle, rng: np.random.Generator) -> tuple[Clip, Array, str] | None:
+    """Somebody who stands and is alive."""
+    body = idle.body(int(rng.integers(80, LONGEST)), rng)
+    recorded = next((clip for clip in clips if clip.kind == "capture"), None)
+    return None if body is None or recorded is None else (recorded, at_origin(body), STANDS)
 
 
 def is_handed(clip: Clip) -> bool:
