@@ -126,7 +126,7 @@ def with_bones(places: Array, ankles: Array, toes: Array, ahead: Array | None = 
         level = limbs.unit(foot * [1, 0, 1]) if ahead is None else ahead[:, i]
         line = limbs.unit(ankles[:, i] - result[:, hip])
         bent = limbs.beside(places[:, knee] - places[:, hip], limbs.unit(places[:, ankle] - places[:, hip]))
-        pole = bent / 0.08 + limbs.beside(level, line)
+        pole = bent / 0.02 + limbs.beside(level, line)
         upper, lower = float(LENGTHS[knee]), float(LENGTHS[ankle])
         result[:, knee], result[:, ankle] = limbs.bend(result[:, hip], ankles[:, i], pole, upper=upper, lower=lower)
         result[:, toe] = result[:, ankle] + LENGTHS[toe] * foot

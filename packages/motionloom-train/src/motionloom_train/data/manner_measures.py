@@ -23,6 +23,7 @@ def measure(places: Array, fps: float) -> Measures:
     result = _steps(places, body, fps) | _posture(places, body, fps)
     for name, arm in zip("lr", _ARMS):
         result |= _arm(body, arm, name, fps)
+    result["hand_top"] = max(result["hand_up_l"], result["hand_up_r"])
     result["arm_swing"] = (result["swing_l"] + result["swing_r"]) / 2
     result["hands_apart"] = float(np.linalg.norm(places[:, 20] - places[:, 21], axis=-1).mean())
     hands = body[:, [20, 21]] - ph.smooth(body[:, [20, 21]], 3)
@@ -37,7 +38,7 @@ def _steps(p: Array, body: Array, fps: float) -> Measures:
     seconds = len(p) / fps
     path = ph.smooth(ph.smooth(p[:, 0] * [1, 0, 1], ph.odd(fps)), ph.odd(fps / 2))
     facing = ph.smooth(ph.heading(p), ph.odd(fps))
-    pace = float(np.linalg.norm(np.diff(path, axis=0), axis=-1).sum() / seconds)
+    pace = float(np.median(ph.speed(p, fps)))
     holds = []
     for i, (_, _, ankle, toes) in enumerate(_FEET):
         for a, b in spans[i]:

@@ -9,7 +9,7 @@ from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom_train.data.actions import PREFIX
+from motionloom_train.data.actions import PREFIX, side_of
 from motionloom_train.data.augment import NO_IDLE, Idle
 from motionloom_train.data.clips import MANNER, Clip, Note
 from motionloom_train.data.manner_measures import measure
@@ -59,7 +59,7 @@ def mannered_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle 
             if total == wanted or found is None:
                 continue
             clip, body, person = found
-            side = ("right", "left")[number // 2 % 2] if manner.sided else "right"
+            side = ("right", "left")[number // 2 % 2] if manner.sided and on == "walk" else "right"
             strength = STRENGTHS[int(rng.integers(len(STRENGTHS)))]
             places = put_on(body, manner, fps=FPS, rng=rng, strength=strength, side=side)
             if not shows(manner, places, on):
@@ -117,10 +117,12 @@ def _standing(clips: Sequence[Clip], idle: Idle, rng: np.random.Generator) -> tu
 
 
 def is_handed(clip: Clip) -> bool:
-    """Whether the clip's manner has a hand for each thing, so that its mirror image would be of another."""
-    return any(
-        n.kind.startswith(PREFIX + MANNER) and MANNERS[n.kind[len(PREFIX + MANNER) :]].handed for n in clip.notes
-    )
+    """Whether each hand has a part in the clip's manner that its words do not name: it is not mirrored then."""
+    for note in clip.notes:
+        manner = MANNERS.get(note.kind.removeprefix(PREFIX + MANNER))
+        if manner and (manner.handed or (manner.sided and not side_of(note.texts))):
+            return True
+    return False
 
 
 def shows(manner: Manner, places: Array, on: str) -> bool:

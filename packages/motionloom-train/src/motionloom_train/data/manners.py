@@ -179,9 +179,9 @@ def _stepped(gait: Gait, manner: Manner, side: str, noise: _Noise) -> tuple[Arra
     walks = smoothstep(speed / 0.5)
     aside = manner.wander * noise.curve(0.12, 0.3) * ph.smooth(walks, ph.odd(fps))
     aside -= aside[0]
-    steps = np.gradient(path, axis=0) * manner.step
+    steps = np.diff(path, axis=0, prepend=path[:1]) * manner.step
     left = np.stack([np.cos(facing), 0 * facing, -np.sin(facing)], axis=-1)
-    new = path[:1] + np.cumsum(steps, axis=0) - steps[:1] + aside[:, None] * left
+    new = path[:1] + np.cumsum(steps, axis=0) + aside[:, None] * left
     turn = np.arctan2(np.gradient(aside) * fps, np.maximum(manner.step * speed, 0.6)) * walks
     turn = ph.smooth(turn, ph.odd(fps / 2))
     offset = p - path[:, None]
