@@ -138,7 +138,15 @@ def words_of(manner: Manner, on: str, side: str, rng: np.random.Generator) -> tu
     named = [phrase.format(side=side) for phrase in manner.sided] if on == "walk" else []
     if manner.sided and side == "left":
         phrases = named
-    texts = [sentence(phrase, rng) for phrase in [*phrases, *named]]
+    texts = [_sentence(phrase, rng) for phrase in [*phrases, *named]]
     if on == manner.on[0] and not (manner.sided and side == "left"):
         texts += manner.lines
     return tuple(dict.fromkeys(texts))
+
+
+def _sentence(phrase: str, rng: np.random.Generator) -> str:
+    """A subject before the phrase, or another form of it where its verb has one: nobody "is being sad"."""
+    first = phrase.split()[0].rstrip(",")
+    if first.endswith("s") and first != "is":
+        return sentence(phrase, rng)
+    return f"{('a person', 'a man', 'a woman', 'someone', 'he', 'she')[int(rng.integers(6))]} {phrase}"
