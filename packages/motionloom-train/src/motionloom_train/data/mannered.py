@@ -26,7 +26,7 @@ SHORTEST, LONGEST, MOST = 60, 160, 200
 STANDS = "somebody"
 """Who it is that stands: stretches of `Idle` have no names."""
 _OTHERWISE = re.compile(
-    r"skip|hop|leap|box|zombie|crouch|hurt|guard|shoot|hang|drunk|\bold|limp|march|sneak|tired|sad\b|happy|angry|stealth"
+    r"skip|hop|leap|box|ball|dribbl|angr|confiden|aggressiv|favor|slid|scrambl|wide|wavy|zombie|crouch|hurt|guard|shoot|hang|drunk|\bold|limp|march|sneak|tired|sad\b|happy|angry|stealth"
     r"|careful|creep|carry|object|uneven|stairs|climb|danc|jump|bow|back|float|levitat|moonwalk|stumbl|sway|swing|strange",
 )
 """What a recording has in its name or captions that is in a manner already."""
@@ -80,10 +80,11 @@ def _body_kind(manner: Manner, number: int) -> str:
 def _bodies(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:
     """Recordings in no manner, by person."""
     people: dict[str, list[tuple[Clip, Note]]] = {}
+    otherwise = {clip.name for clip in clips if not is_plain(clip)}  # looped ones have no captions
     for clip in clips:
         if clip.split != "train" or clip.way not in ("plain", "looped") or clip.kind == "keyed" or clip.name[0] == "M":
             continue
-        if not is_plain(clip):
+        if clip.name.split("_looped")[0] in otherwise:
             continue
         for note in clip.notes:
             if note.kind in labels and note.last - note.first >= SHORTEST:
