@@ -31,7 +31,7 @@ KEPT_OUT = ("07", "16", "35", "accad_Male2")
 """People whose clips are not learned from."""
 WINDOW, EVERY, SHORTEST = 80, 40, 50
 """Frames of a window, from one to the next, and of a clip that is shorter."""
-STEPS, RATE, DECAY = 600, 0.03, 3e-4
+STEPS, RATE, DECAY = 600, 0.03, 3e-3
 """Of the optimiser (Adam over all windows at once), and how weights are kept small."""
 _ANGLE_OF_SIDE = ("elbow", "hand_up", "hand_ahead", "hand_out", "swing", "hand_moves")
 _LEG = ("stance", "toe_lift", "ankle_lift", "thigh", "heel", "swing_knee", "stance_knee")

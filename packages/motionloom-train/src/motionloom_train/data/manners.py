@@ -93,12 +93,14 @@ class Manner:
 def _read() -> dict[str, Manner]:
     rows: dict[str, dict[str, Any]] = read_table("motionloom_train.data", "manners.toml")
     manners = {}
-    for name, row in rows.items():
-        row = {key: float(v) if type(v) in (int, float) else v for key, v in row.items() if key != "literature"}
-        says = {on: tuple(row.pop(on)) for on in ("walk", "run", "stand") if on in row}
-        hands = {side: tuple(map(tuple, row.pop(side))) for side in _NAMES if side in row}
-        words = {key: tuple(row.pop(key, ())) for key in ("lines", "sided")}
-        manners[name] = Manner(name, tuple(says), says, **words, **row, **hands)
+    for name, entry in rows.items():
+        row: dict[str, Any] = {k: float(v) if type(v) is int else v for k, v in entry.items() if k != "literature"}
+        kept: dict[str, Any] = {
+            "says": {on: tuple(row.pop(on)) for on in ("walk", "run", "stand") if on in row},
+            **{side: tuple(map(tuple, row.pop(side))) for side in _NAMES if side in row},
+            **{key: tuple(row.pop(key, ())) for key in ("lines", "sided")},
+        }
+        manners[name] = Manner(name, tuple(kept["says"]), **kept, **row)
     return manners
 
 
