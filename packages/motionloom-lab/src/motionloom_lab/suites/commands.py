@@ -13,7 +13,7 @@ from motionloom_lab.report import files
 from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import Report
 from motionloom_lab.suites import options, registry
-from motionloom_lab.suites.harness import Generate, Run, say, weight_marks
+from motionloom_lab.suites.harness import Generate, Run, check_names, say, weight_marks
 
 Asked = Mapping[str, Any]
 PROMPT = "a person walks forward and waves"
@@ -309,6 +309,34 @@ def realism(asked: Asked) -> None:
     if out:
         files.write_json(out / "realism.json", found)
         write_page(asked, "realism", "Realism", said, tables)
+    print(json.dumps(found, indent=1) if asked.get("json") else "\n\n".join([*map(files.plain, tables), said]))
+
+
+def manners(asked: Asked) -> None:
+    """What a classifier of manners sees in motions of their sentences, and in people it did not learn from."""
+    from motionloom_lab.suites import manners
+
+    asked = {**asked, "finished": not asked.get("sampled")}
+    seeds, out, known = asked["seeds"], asked.get("out"), manners.sentences()
+    if not 0 <= seeds <= 1000:
+        raise MotionloomError(f"the seeds of a sentence are from 0 to 1000; got {seeds}")
+    only = asked.get("only") or list(known)
+    check_names(only, known, "manners")
+    if out:
+        files.check_report(out / "manners.json")
+    classifier, people = manners.trained(asked["data"], say)
+    found: dict[str, Any] = {"kept_out": people}
+    tables, said = [manners.rows(people)], f"people who were kept out: {manners.line(people)}"
+    if seeds:
+        generate = generator_of(asked)
+        found["generated"] = manners.asked(
+            generate, classifier, seeds=seeds, seed=asked.get("seed", 0), only=only, progress=say
+        )
+        tables.append(manners.rows(found["generated"]))
+        said += f"; generated motions: {manners.line(found['generated'])}"
+    if out:
+        files.write_json(out / "manners.json", {"settings": sampling_of(asked), **found})
+        write_page(asked, "manners", "Manners", said, tables)
     print(json.dumps(found, indent=1) if asked.get("json") else "\n\n".join([*map(files.plain, tables), said]))
 
 

@@ -48,6 +48,7 @@ from motionloom_train.data.derived import (
     there_and_back,
 )
 from motionloom_train.data.made import hands_up
+from motionloom_train.data.mannered import is_handed, mannered_clips
 from motionloom_train.data.measured import measured_notes
 from motionloom_train.data.person import uniform_person
 from motionloom_train.data.progress import Say
@@ -55,7 +56,7 @@ from motionloom_train.data.sources import Places, Span, Take, find_takes
 from motionloom_train.data.windows import label_clip
 from motionloom_train.data.words import STATES, mirror_text
 
-_DERIVED = re.compile(r"M?(held|mixed|joined|made|posture|there)_\d")
+_DERIVED = re.compile(r"M?(held|mixed|joined|made|manner|posture|there)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
 BENDS = (0.35, 0.75, 1.0)
 """Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
@@ -418,9 +419,10 @@ def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
         longer = [held for clip in held_clips(same, idle) for held in _with_mirror(clip)]
         yield from longer
         same += longer
-        for derive in (mixed_clips, laid_down, sat_and_risen, joined_clips, made_clips, posture_clips, there_and_back):
+        ways = (mixed_clips, laid_down, sat_and_risen, joined_clips, made_clips, posture_clips, there_and_back)
+        for derive in (*ways, mannered_clips):
             for clip in derive(same, round(mixed * share), seed, idle):
-                yield from (clip,) if derive is mixed_clips else _with_mirror(clip)
+                yield from (clip,) if derive is mixed_clips or is_handed(clip) else _with_mirror(clip)
 
 
 def _summary(clips: Sequence[Clip], dropped: dict[str, str], compared: Mapping[str, gate.Compared]) -> dict[str, Any]:

@@ -21,8 +21,9 @@ MAX_BYTES = 256 << 20
 """Of a clip's file: more than an hour and a half of features."""
 SHORTEST = 20
 """Frames of the shortest stretch that is described."""
-THEN, GESTURE = "then", "made "
-"""Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
+THEN, GESTURE, MANNER = "then", "made ", "manner "
+"""Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`; manners of
+`data.manners`."""
 MEASURED = "measured:"
 """What the kind of a note begins with whose words are measured in its frames (`data.measured`)."""
 KINDS = ("capture", "keyed", "made")

@@ -18,8 +18,9 @@ from motionloom.io.text import parse_json, read_utf8
 from motionloom.reading import read_table
 from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
-from motionloom_train.data.clips import GESTURE, MEASURED, Clip, Note, read_clip
+from motionloom_train.data.clips import GESTURE, MANNER, MEASURED, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
+from motionloom_train.data.manners import MANNERS
 from motionloom_train.data.words import EVENTS, STATES, phrases, sentence
 
 
@@ -189,6 +190,8 @@ def _of_its_side(note: Note, texts: tuple[str, ...]) -> tuple[str, ...]:
     gesture = GESTURES.get(name.removeprefix(GESTURE))
     action = ACTIONS.get(name)
     one = gesture.hands == "one" or bool(gesture.thrust[2]) if gesture else action and action.sided and not action.turns
+    manner = MANNERS.get(name.removeprefix(MANNER)) if name.startswith(MANNER) else None
+    one = bool(manner.sided) if manner else one
     if not one or side_of(note.texts) != "left":
         return texts
     return tuple(text for text in texts if side_of([text]) == "left") or texts
