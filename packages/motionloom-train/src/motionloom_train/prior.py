@@ -1,6 +1,7 @@
 """Training a prior from a recipe: the data, the network, the text encoder, and the weight file that comes out."""
 
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -74,19 +75,25 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
     motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
     torch.manual_seed(recipe.seed)
     net = PriorNet(NetConfig.parse(recipe.net))
+    teacher: nn.Module | None = None
     if recipe.start:
-        start = Prior.load(recipe.start)
-        if replace(start.net.config, dropout=net.config.dropout) != net.config:
-            raise MotionloomError(
-                f"the recipe's network {net.config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
-            )
-        net.load_state_dict(prior_module(start).state_dict())
+        start = load_start(recipe, net.config)
+        module = prior_module(start)
+        net.load_state_dict(module.state_dict())
         motions = restandardised(motions, tensor(start.mean), tensor(start.std))
+        teacher = Conditioned(module.to(world.device)) if recipe.keep else None
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     motions = replace(motions, features=motions.features.to(world.device))
-    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
+    batches = Batches(
+        motions,
+        windows=recipe.windows,
+        shares=recipe.shares,
+        favour=FAVOUR | recipe.favour,
+        fresh=recipe.fresh,
+        fresh_of=recipe.fresh_of,
+    )
     words = WordBank(text, motions.texts, device=world.device, progress=run.progress)
-    objective = CleanError(net, schedule, batches, words, recipe, world.device)
+    objective = CleanError(net, schedule, batches, words, recipe, world.device, teacher=teacher)
     known = known_table(motions, text)
 
     def export(average: Average, step: int) -> None:
@@ -108,6 +115,24 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
         f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded"
     )
     return run.run(objective, export, about, wrap=wrap, capture=capture)
+
+
+def load_start(recipe: Recipe, config: NetConfig) -> Prior:
+    """The weights that a recipe goes on from; raises MotionloomError if they are not those it names, or of another
+    network than ``config``."""
+    path = find_weights(recipe.start)
+    digest = sha256(path.read_bytes()).hexdigest()
+    if recipe.start_sha256 and digest != recipe.start_sha256:
+        raise MotionloomError(
+            f"{path} has the SHA-256 {digest[:12]}..., and the recipe goes on from {recipe.start_sha256[:12]}...; name "
+            "that file with --set start=FILE, or take any with --set start_sha256="
+        )
+    start = Prior.load(path)
+    if replace(start.net.config, dropout=config.dropout) != config:
+        raise MotionloomError(
+            f"the recipe's network {config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
+        )
+    return start
 
 
 def restandardised(motions: MotionSet, mean: Tensor, std: Tensor) -> MotionSet:
