@@ -154,7 +154,8 @@ def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text
     net = PriorNet(NetConfig.parse(recipe.net))
     net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
     notes: dict[str, Any] = {"steps": step, "recipe": recipe.name, "seed": recipe.seed}
-    notes |= {"minutes": round(motions.minutes, 1)} | ({"start": recipe.start} if recipe.start else {})
+    begun = {"start": recipe.start, "start_sha256": recipe.start_sha256}
+    notes |= {"minutes": round(motions.minutes, 1)} | {key: value for key, value in begun.items() if value}
     card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     return Prior(prior_session(net), schedule, motions.mean.numpy(), motions.std.numpy(), text, card)

@@ -72,6 +72,7 @@ def test_a_continuation_that_keeps_what_is_old_resumes_exactly() -> None:
     assert main([*BASE, "--out", "whole", *words]) == 0
     assert main([*BASE, "--out", "parts", *words, "--stop", "3"]) == 0
     assert main([*BASE, "--out", "parts", *words]) == 0
+    assert load_prior(Path("parts/mine.safetensors")).card.notes["start_sha256"] == digest
     whole, parts = (load_file(f"{run}/state.safetensors") for run in ("whole", "parts"))
     assert all(np.array_equal(parts[key], value) for key, value in whole.items())
 
