@@ -1,12 +1,21 @@
 """What a training step minimises."""
 
+from pathlib import Path
+
 import numpy as np
 import torch
+from torch import nn
 
+from motionloom.diffusion import SCHEDULES
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FEET, LAYOUT, ric
-from motionloom_train.objectives import PLANTED, displacement_error, feature_scale
+from motionloom_train.data.batches import Batches
+from motionloom_train.data.sets import load_set
+from motionloom_train.nets.prior import Condition
+from motionloom_train.objectives import PLANTED, CleanError, WordBank, displacement_error, feature_scale
 from tests.kinematics.people import walking
+from tests.recorded import tiny
+from tests_train import runs
 
 MEAN, STD = torch.full((263,), 0.1), torch.full((263,), 0.5)
 
@@ -69,3 +78,34 @@ def test_heights_count_more_and_nothing_else_does() -> None:
         target[ric(joint).start + 1] = 3.0
     torch.testing.assert_close(ratio, target)
     torch.testing.assert_close(raised.mean(), torch.tensor(1.0))
+
+
+class Constant(nn.Module):
+    """Estimates that are one number everywhere."""
+
+    def __init__(self, value: float) -> None:
+        super().__init__()
+        self.value = nn.Parameter(torch.tensor(value))
+
+    def forward(self, x: torch.Tensor, level: torch.Tensor, cond: Condition) -> torch.Tensor:
+        return self.value.expand_as(x)
+
+
+def test_only_rows_that_are_not_fresh_are_kept_near_the_teacher(tmp_path: Path) -> None:
+    """Estimates of 3 beside a teacher's of 1: (3 - 1)^2 on three quarters of the rows, whatever the data."""
+    data = load_set(runs.write_set(tmp_path / "set"))
+    batches = Batches(data, windows=(20,), shares=(1.0,), fresh=0.25, fresh_of=("walk fast",))
+    words = WordBank(tiny.text(), data.texts, progress=lambda line: None)
+    net, teacher = Constant(3.0), Constant(1.0)
+
+    def loss(keep: float) -> torch.Tensor:
+        recipe = runs.recipe(keep=keep)
+        objective = CleanError(net, SCHEDULES["cosine"](50), batches, words, recipe, teacher=teacher)
+        return objective.loss(net, 0, 0, 8)
+
+    added = loss(2.0) - loss(0.0)
+    np.testing.assert_allclose(added.item(), 2.0 * 4.0 * 0.75, rtol=1e-4)
+    added.backward()
+    assert net.value.grad is not None
+    np.testing.assert_allclose(net.value.grad.item(), 2.0 * 2 * 2.0 * 0.75, rtol=1e-4)
+    assert teacher.value.grad is None

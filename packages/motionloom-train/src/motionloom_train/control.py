@@ -212,7 +212,7 @@ def train_control(run: Training, data: Path | str, text: TextEncoder) -> Path:
     )
     torch.manual_seed(recipe.seed)
     net = _trained(recipe, prior, world.device)
-    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
+    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=FAVOUR | recipe.favour)
     words = WordBank(text, motions.texts, progress=run.progress)
     alike = replace(recipe, early=0.0, heights=1.0)  # as published; levels go by the recipe's ``spacing``
     objective = ControlledError(net, prior.schedule, batches, words, alike, world.device)

@@ -101,6 +101,10 @@ class CleanError:
     The recipe's ``early``, ``heights``, ``drop_text`` and ``displacement`` are heeded: early levels lie near pure
     noise, where it is decided what a motion will show, and `displacement_error` is in place of MDM's geometric losses
     (eq. 4 and 5), which its published text models leave out.
+
+    The recipe's ``keep`` holds the network to ``teacher``, the one it began as, on rows that are not fresh: their error
+    against its estimate of the same state under the same condition is added (as Li & Hoiem 2016, "Learning without
+    forgetting").
     """
 
     def __init__(
@@ -111,8 +115,12 @@ class CleanError:
         words: WordBank,
         recipe: Recipe | None = None,
         device: str = "cpu",
+        *,
+        teacher: nn.Module | None = None,
     ) -> None:
+        """``teacher``: called as the network in `loss` is, on ``device``; needed where the recipe has ``keep``."""
         self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
+        self.teacher = teacher
         self.recipe, self.device = recipe or Recipe(), device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
         self.scale = feature_scale(self.recipe.heights).to(device)
@@ -132,7 +140,19 @@ class CleanError:
         sample = self._noisy(shape, picked, generator)
         at = sample.level[:, None, None]
         state = self._signal[at] * sample.clean + self._spread[at] * sample.noise
-        return self.error(net(state, sample.level, sample.cond), sample)
+        denoised = net(state, sample.level, sample.cond)
+        error = self.error(denoised, sample)
+        return error + self.recipe.keep * self.strayed(denoised, state, sample) if self.recipe.keep else error
+
+    def strayed(self, denoised: Tensor, state: Tensor, sample: Sample) -> Tensor:
+        """How far estimates are from those of ``teacher``, over the rows that are not fresh; they count as in a batch
+        of which they are a part, so that ``keep`` means the same beside the data's error at any share of fresh rows."""
+        assert self.teacher is not None, "the recipe keeps near weights that are not there"
+        old = slice(self.batches.old_rows(len(denoised)))
+        cond = Condition(*(part[old] for part in sample.cond))
+        with torch.no_grad():
+            target = self.teacher(state[old], sample.level[old], cond).float()
+        return masked_error(denoised[old], target, cond.lengths, self.scale) * len(target) / len(denoised)
 
     def number(self, seed: int, step: int) -> int:
         """See `motionloom_train.captured.Capturable`."""

@@ -1,6 +1,7 @@
 """Training a prior from a recipe: the data, the network, the text encoder, and the weight file that comes out."""
 
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -75,19 +76,25 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
     motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
     torch.manual_seed(recipe.seed)
     net = PriorNet(NetConfig.parse(recipe.net))
+    teacher: nn.Module | None = None
     if recipe.start:
-        start = Prior.load(recipe.start)
-        if replace(start.net.config, dropout=net.config.dropout) != net.config:
-            raise MotionloomError(
-                f"the recipe's network {net.config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
-            )
-        net.load_state_dict(prior_module(start).state_dict())
+        start = load_start(recipe, net.config)
+        module = prior_module(start)
+        net.load_state_dict(module.state_dict())
         motions = restandardised(motions, tensor(start.mean), tensor(start.std))
+        teacher = Conditioned(module.to(world.device)) if recipe.keep else None
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     motions = replace(motions, features=motions.features.to(world.device))
-    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
+    batches = Batches(
+        motions,
+        windows=recipe.windows,
+        shares=recipe.shares,
+        favour=FAVOUR | recipe.favour,
+        fresh=recipe.fresh,
+        fresh_of=recipe.fresh_of,
+    )
     words = WordBank(text, motions.texts, device=world.device, progress=run.progress)
-    objective = CleanError(net, schedule, batches, words, recipe, world.device)
+    objective = CleanError(net, schedule, batches, words, recipe, world.device, teacher=teacher)
     known = known_table(motions, text)
 
     def export(average: Average, step: int) -> None:
@@ -111,6 +118,24 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
     return run.run(objective, export, about, wrap=wrap, capture=capture)
 
 
+def load_start(recipe: Recipe, config: NetConfig) -> Prior:
+    """The weights that a recipe goes on from; raises MotionloomError if they are not those it names, or of another
+    network than ``config``."""
+    path = find_weights(recipe.start)
+    digest = sha256(path.read_bytes()).hexdigest()
+    if recipe.start_sha256 and digest != recipe.start_sha256:
+        raise MotionloomError(
+            f"{path} has the SHA-256 {digest[:12]}..., and the recipe goes on from {recipe.start_sha256[:12]}...; name "
+            "that file with --set start=FILE, or take any with --set start_sha256="
+        )
+    start = Prior.load(path)
+    if replace(start.net.config, dropout=config.dropout) != config:
+        raise MotionloomError(
+            f"the recipe's network {config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
+        )
+    return start
+
+
 def restandardised(motions: MotionSet, mean: Tensor, std: Tensor) -> MotionSet:
     """The same motions under other statistics, (features,) each."""
     features = (motions.features * motions.std + motions.mean - mean) / std
@@ -130,7 +155,8 @@ def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text
     net = PriorNet(NetConfig.parse(recipe.net))
     net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
     notes: dict[str, Any] = {"steps": step, "recipe": recipe.name, "seed": recipe.seed}
-    notes |= {"minutes": round(motions.minutes, 1)} | ({"start": recipe.start} if recipe.start else {})
+    begun = {"start": recipe.start, "start_sha256": recipe.start_sha256}
+    notes |= {"minutes": round(motions.minutes, 1)} | {key: value for key, value in begun.items() if value}
     card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     return Prior(prior_session(net), schedule, motions.mean.numpy(), motions.std.numpy(), text, card)

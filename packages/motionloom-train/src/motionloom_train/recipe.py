@@ -36,7 +36,11 @@ class Recipe:
     shares: list[float] = field(default_factory=lambda: [0.2, 0.3, 0.35, 0.15])
     """How often each length is sampled."""
     favour: dict[str, Any] = field(default_factory=dict)
-    """How often measured labels are sampled, 1 being usual; empty: `motionloom_train.data.batches.FAVOUR`."""
+    """How often groups are sampled, 1 being usual, over `motionloom_train.data.batches.FAVOUR`."""
+    fresh: float = 0.0
+    """Share of each batch that shows only what ``fresh_of`` names; the rest shows only the rest of the set."""
+    fresh_of: list[str] = field(default_factory=list)
+    """Beginnings of sources (``sl_internal``) and of groups (``manner ``): what counts as fresh."""
     rate: float = 8e-4
     """Learning rate after the warm-up."""
     warmup: int = 300
@@ -71,6 +75,10 @@ class Recipe:
     """What the sample pictures show."""
     start: str = ""
     """Weights to go on from: a shipped name or a path; empty: random ones."""
+    start_sha256: str = ""
+    """SHA-256 of the file that ``start`` names; another file is refused. Empty: any."""
+    keep: float = 0.0
+    """Weight of the squared distance between the estimates of the network and of ``start``, on what is not fresh."""
     control: str = ""
     """Control training: what is given, see `motionloom_train.control.CONTROLS`."""
     full: bool = False
@@ -139,6 +147,7 @@ LIMITS: Mapping[str, float] = {
     "rate": 10.0,
     "decay": 10.0,
     "displacement": 1000.0,
+    "keep": 1000.0,
     "rank": 512,
     "given_rank": 512,
     "save_every": 10**9,
@@ -147,7 +156,7 @@ LIMITS: Mapping[str, float] = {
 
 
 def _check(path: Path, recipe: Recipe) -> None:
-    lists = {"sources": str, "prompts": str, "windows": int, "shares": int | float}
+    lists = {"sources": str, "prompts": str, "windows": int, "shares": int | float, "fresh_of": str}
     for key, kind in lists.items():
         if not all(isinstance(value, kind) and not isinstance(value, bool) for value in getattr(recipe, key)):
             raise MotionloomError(f"{path}: an entry of {key} is of the wrong kind: {_repr(getattr(recipe, key))}")
@@ -174,6 +183,9 @@ def _in_range(recipe: Recipe) -> Iterator[bool]:
     yield 0 <= recipe.ema < 1
     yield 0 <= recipe.drop_text < 1
     yield 0 <= recipe.early <= 1
+    yield 0 <= recipe.fresh < 1
+    yield bool(recipe.fresh) == bool(recipe.fresh_of)
+    yield not recipe.keep or bool(recipe.start)
     yield 0 < recipe.heights <= 100
     yield 0 <= recipe.cooldown <= 1
     yield 0 <= recipe.warmup <= 10**9

@@ -1,10 +1,12 @@
 """data build, train and generate, one after the other, as the documents tell a stranger to do it."""
 
+import hashlib
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import load_file
 
 from motionloom.cli import main
 from motionloom.weights.prior import load_prior, save_prior
@@ -61,9 +63,27 @@ def test_a_model_is_trained_continued_and_used(capsys: pytest.CaptureFixture[str
     )
 
 
+def test_a_continuation_that_keeps_what_is_old_resumes_exactly() -> None:
+    """Half of each batch fresh, held near the weights it began with, which the recipe names by their hash."""
+    assert main([*BASE, "--out", "run"]) == 0
+    digest = hashlib.sha256(Path("run/mine.safetensors").read_bytes()).hexdigest()
+    start = ["start=run/mine.safetensors", f"start_sha256={digest}", "keep=1.0"]
+    words = ["--set", *start, "fresh=0.5", "fresh_of=['walk fast']", "steps=6"]
+    assert main([*BASE, "--out", "whole", *words]) == 0
+    assert main([*BASE, "--out", "parts", *words, "--stop", "3"]) == 0
+    assert main([*BASE, "--out", "parts", *words]) == 0
+    assert load_prior(Path("parts/mine.safetensors")).card.notes["start_sha256"] == digest
+    whole, parts = (load_file(f"{run}/state.safetensors") for run in ("whole", "parts"))
+    assert all(np.array_equal(parts[key], value) for key, value in whole.items())
+
+
 @pytest.mark.parametrize(
     "words",
     [
+        ["--set", "start=tiny.safetensors", f"start_sha256={'0' * 64}"],
+        ["--set", "keep=1.0"],
+        ["--set", "fresh=0.5"],
+        ["--set", "fresh=0.5", "fresh_of=['absent']"],
         ["--set", "stepps=1"],
         ["--set", "steps"],
         ["--set", "net.width=7"],

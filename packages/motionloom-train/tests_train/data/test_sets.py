@@ -35,7 +35,7 @@ def kicking(folder: Path) -> Path:
 
 def items_of(batches: Batches, window: int) -> list[Item]:
     """The items that windows of so many frames are taken from."""
-    return [batches.data.items[number] for number in batches._pools[window].numbers]
+    return [batches.data.items[number] for number in batches._pools[window][0].numbers]
 
 
 def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -> None:
@@ -133,6 +133,28 @@ def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_p
         texts, ["an animated person eats", "a person eats"]
     ).sum()
     assert abs(keyed - 0.4 / 9.4) < 0.03
+
+
+def test_a_share_of_each_batch_is_fresh_and_the_rest_is_not(tmp_path: Path) -> None:
+    """Fresh by source or by group: the last rows of every batch, whatever is favoured among the others."""
+    folder = tmp_path / "set"
+    described(folder, Note(0, 100, "action:eat", ("a person eats",)), kind="made")
+    described(folder, Note(0, 100, "action:manner limp", ("a person limps",)))
+    described(folder, Note(0, 100, "action:nod", ("a person nods",)), kind="keyed")
+    data = load_set(folder)
+    items = tuple(replace(item, source="pack" if item.group == "action:nod" else "cmu") for item in data.items)
+    batches = Batches(
+        replace(data, items=items), windows=(48,), shares=(1.0,), fresh=0.25, fresh_of=("manner ", "pack")
+    )
+    fresh = {number for item in items if item.group != "action:eat" for number in item.texts}
+    assert batches.old_rows(8) == 6
+    seen: set[int] = set()
+    for step in range(12):
+        texts = batches.draw(0, step, 8).texts.tolist()
+        assert not fresh & set(texts[:6])
+        assert fresh >= set(texts[6:])
+        seen |= set(texts)
+    assert all(seen & set(item.texts) for item in items)
 
 
 def test_windows_of_a_climb_begin_on_the_floor(tmp_path: Path) -> None:

@@ -44,6 +44,9 @@ class Batches:
     All rows of a batch share a window (one of ``windows`` frames, sampled by ``shares``); items shorter than the window
     but at least 60 % of it are whole and padded. What an item needs to show what its texts name (`Item.core`) is
     always within the window. Batches lie on the device of the set's features; random numbers are generated on the CPU.
+
+    ``fresh``: share of each batch, its last rows, that shows items which are fresh by ``fresh_of`` (`is_fresh`); the
+    other rows show the other items.
     """
 
     def __init__(
@@ -53,6 +56,8 @@ class Batches:
         windows: Sequence[int] = (48, 80, 120, 196),
         shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15),
         favour: Mapping[str, float] = FAVOUR,
+        fresh: float = 0.0,
+        fresh_of: Sequence[str] = (),
     ) -> None:
         self.data, self.windows = data, tuple(windows)
         self.shares = np.array(shares) / np.sum(shares)
@@ -61,13 +66,22 @@ class Batches:
         self._heights = torch.zeros(len(data.mean), dtype=torch.bool)
         self._heights[HEIGHTS] = True
         self._heights = self._heights.to(place)
-        self._pools = {w: Pool.of(data.items, w, favour) for w in self.windows}
+        self._fresh = fresh
+        parts = {"": [item for item in data.items if not is_fresh(item, fresh_of)]}
+        if fresh:
+            parts["fresh "] = [item for item in data.items if is_fresh(item, fresh_of)]
+        self._pools = {w: [Pool.of(items, w, favour) for items in parts.values()] for w in self.windows}
         for window, share in zip(self.windows, self.shares, strict=True):
-            if share > 0 and not len(self._pools[window].numbers):
-                raise MotionloomError(
-                    f"no described stretch of the set is long enough for windows of {window} frames (60 % is needed); "
-                    "give the recipe shorter windows"
-                )
+            for part, pool in zip(parts, self._pools[window], strict=True):
+                if share > 0 and not len(pool.numbers):
+                    raise MotionloomError(
+                        f"no described {part}stretch of the set is long enough for windows of {window} frames (60 % is "
+                        "needed); give the recipe shorter windows"
+                    )
+
+    def old_rows(self, rows: int) -> int:
+        """How many rows of a batch, its first ones, show what is not fresh; at least one."""
+        return max(1, rows - round(self._fresh * rows))
 
     def draw(self, seed: int, step: int, rows: int) -> Batch:
         """The batch of one step."""
@@ -79,7 +93,10 @@ class Batches:
         frame in the set, valid frames, number of its sentence, and 1 where it is lowered to the floor."""
         rng = np.random.default_rng((seed, step))
         window = int(rng.choice(self.windows, p=self.shares))
-        return window, torch.from_numpy(np.stack(self._pools[window].draw(rng, rows)).astype(np.int64))
+        old = self.old_rows(rows)
+        counts = (old, rows - old)[: len(self._pools[window])]
+        parts = [np.stack(pool.draw(rng, count)) for pool, count in zip(self._pools[window], counts, strict=True)]
+        return window, torch.from_numpy(np.concatenate(parts, axis=1).astype(np.int64))
 
     def show(self, window: int, picked: Tensor) -> Batch:
         """The windows that `pick` names; ``picked`` on the device of the set's features. A GPU never waits for it."""
@@ -100,6 +117,11 @@ class Batches:
         heights = crops[:, 0] * self._std + self._mean
         lowest = heights.masked_fill(~self._heights, float("inf")).amin(-1, keepdim=True).clamp(min=0)
         return (lowest / self._std * self._heights)[:, None]
+
+
+def is_fresh(item: Item, fresh_of: Sequence[str]) -> bool:
+    """Whether an item's source, or its group without ``action:``, begins with one of the words."""
+    return any(name.startswith(tuple(fresh_of)) for name in (item.source, item.group.removeprefix(PREFIX)))
 
 
 class Pool(NamedTuple):

@@ -91,6 +91,8 @@ class Item:
     """How often it is sampled among those of its group."""
     rests: tuple[int, ...] = ()
     """Frames of `MotionSet.features` at which a repetition of an exercise begins; windows begin there."""
+    source: str = ""
+    """Of its clip."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +151,9 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
                 core, rests = _when(clip, note.kind, core, first, last, side)
                 span = (start + core[0], start + core[1]) if core else None
                 begins = tuple(start + rest for rest in rests)
+                weight = WEIGHT.get(clip.kind, 1.0)
                 items.append(
-                    Item(start + first, last - first, note.kind, numbers, span, WEIGHT.get(clip.kind, 1.0), begins)
+                    Item(start + first, last - first, note.kind, numbers, span, weight, begins, source=clip.source)
                 )
         start += len(clip.features)
     features = torch.from_numpy(np.concatenate([c.features for c in clips]))
