@@ -244,13 +244,24 @@ def sizes(path: Path) -> dict[str, int]:
     return {"files": len(places), "bytes": sum(place.stat().st_size for place in places)}
 
 
+def leads_out(place: Path, folder: Path) -> bool:
+    """Whether a link on the way makes ``place`` a file outside of the folder."""
+    try:
+        return not place.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # links that lead to each other
+        return True
+
+
 def hashes(path: Path) -> dict[str, str]:
-    """SHA-256 of a shard's files by their names; of a shard that is one file, that one's. Empty: it cannot be read."""
+    """SHA-256 of a shard's files by their names; of a shard that is one file, that one's.
+
+    Empty: it cannot be read, or is a link that leads out of the batch's folder.
+    """
     digests = {}
     for place in sorted(_files(path)):
         name = place.name if place != path else ""
         try:
-            digests[name] = hash_file(place)
+            digests[name] = "" if leads_out(place, path.parent) else hash_file(place)
         except OSError:
             digests[name] = ""
     return digests

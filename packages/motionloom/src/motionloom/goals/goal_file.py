@@ -25,6 +25,7 @@ from motionloom.ground import GroundPose
 from motionloom.io import load
 from motionloom.io.text import read_text
 from motionloom.motion import Motion, ground_pose
+from motionloom.reading import check_texts
 from motionloom.requests import goal as keys
 from motionloom.requests.goal import FARTHEST, MAX_FRAMES
 from motionloom.retarget import to_smpl22
@@ -72,7 +73,7 @@ def _read_json(path: Path) -> Any:
 
     data = read_text(path, max_bytes=MAX_BYTES)
     try:
-        return json.loads(data.decode("utf-8"), object_pairs_hook=unique, parse_constant=constant)
+        values = json.loads(data.decode("utf-8"), object_pairs_hook=unique, parse_constant=constant)
     except json.JSONDecodeError as error:
         raise MotionloomError(f"{path}, line {error.lineno}: this is not JSON: {error.msg}") from None
     except UnicodeDecodeError:
@@ -83,6 +84,8 @@ def _read_json(path: Path) -> Any:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path}: a number has too many digits") from None
+    check_texts(values, str(path))
+    return values
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import Applied
+from motionloom.reading import check_texts
 from motionloom.requests.export import Export
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.reading import narrow_fields, read
@@ -77,6 +78,7 @@ class Assistant:
         """A function that generates motion by a task's request, with its fields as arguments."""
 
         async def call(**fields: Any) -> Any:
+            check_texts(fields, task)
             return await self._results({"task": task} | fields)
 
         known = narrow_fields(REQUESTS[task], most(task, self.worker.limits))
