@@ -24,7 +24,7 @@ from motionloom.io.text import parse_json
 from motionloom.motion import Motion
 from motionloom.requests.batch import RowKeys
 from motionloom.requests.reading import read
-from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
+from motionloom.requests.shared import LONGEST, LONGEST_LINE
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.text import frames_in
 
@@ -91,7 +91,7 @@ class Order:
         """What the motion shows, in words."""
         if self.timeline is None or self.row.prompt:
             return self.row.words or self.row.motion or ""
-        return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_PROMPT]
+        return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_LINE]
 
 
 class Unexpected(MotionloomError):
