@@ -50,9 +50,9 @@ MMCP: dict[str, Any] = {
 }
 CALLS: list[tuple[str, dict[str, Any]]] = [
     ("generate_motion", {"prompt": "a person walks", "seconds": 0.6, "seed": 1, "steps": 3, "count": 1}),
-    ("compose", {"timeline": TIMELINE["timeline"], "steps": 3}),
+    ("compose", {"timeline": {"segments": [{"text": "a person walks", "seconds": 1}]}, "steps": 3}),
     ("control", {"prompt": "a", "seconds": 0.6, "steps": 3, "goals": {"path": {"points": [[0, 0], [0, 1]]}}}),
-    ("edit", {"motion": NAME, "loop": True, "steps": 3}),
+    ("edit", {"motion": NAME, "loop": True, "blend": 0.1, "steps": 3}),
     ("export", {"motion": NAME, "format": "bvh", "name": "walk", "fps": 30}),
 ]
 
