@@ -16,12 +16,12 @@ from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, find_ba
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import ROBOT
 from motionloom.bulk.row import hash_file
-from motionloom.bulk.writers import file_names, json_line, leads_out, parquet_schema, well_formed
+from motionloom.bulk.writers import file_names, json_line, leads_out, parquet_schema
 from motionloom.errors import MotionloomError
 from motionloom.io import load, load_scene
 from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
-from motionloom.reading import read_bytes
+from motionloom.reading import mended, read_bytes
 from motionloom.skeleton import Skeleton
 
 TABLE, ABOUT_TABLE = "metadata", "table.json"
@@ -81,7 +81,7 @@ def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
     schema = pa.schema([*((name, getattr(pa, kind)()) for name, kind in _ABOUT.items()), *known])
     with parquet().ParquetWriter(path, schema, compression="zstd") as file:
         while part := list(islice(entries, _BLOCK)):
-            rows = [{name: well_formed(value) for name, value in entry.items()} for entry in part]
+            rows = [mended(entry) for entry in part]
             file.write_table(pa.Table.from_pylist(rows, schema=schema))
 
 

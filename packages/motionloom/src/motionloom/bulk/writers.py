@@ -24,6 +24,7 @@ from motionloom.io import save, save_scene
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.npz import save_npz
 from motionloom.motion import Motion
+from motionloom.reading import mended
 
 ROWS = 64
 """Motions of a row group of a Parquet file: how many are in memory at once."""
@@ -198,7 +199,7 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
     skeleton = people[0].skeleton  # both are on the same one
     return {
         **about,
-        "text": well_formed(about["text"]),
+        "text": mended(about["text"]),
         "joints": len(skeleton),
         "positions": flat(*(motion.positions() for motion in people)),
         "rotations": flat(*(motion.rotations for motion in people)),
@@ -207,11 +208,6 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
         "parents": list(skeleton.parents),
         "offsets": flat(skeleton.offsets),
     }
-
-
-def well_formed(value: Any) -> Any:
-    """Text that has UTF-8: half of a surrogate pair becomes '?'; anything else as it is."""
-    return value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
 
 
 def json_line(value: dict[str, Any]) -> bytes:
