@@ -72,7 +72,7 @@ def licence_of(name: str, version: str) -> str:
     if told["Version"].partition("+")[0] != version.partition("+")[0]:
         return ""
     lines = (told.get("License-Expression") or told.get("License") or "").strip().splitlines()
-    if lines and len(lines[0]) <= 80:
+    if lines and len(lines[0]) <= 120:
         return lines[0].replace("|", "/")
     kinds = [one.rsplit(" :: ", 1)[-1] for one in told.get_all("Classifier") or () if one.startswith("License ::")]
     return ", ".join(kinds)

@@ -153,7 +153,7 @@ def _build(events: Iterator[Any], path: Path | str) -> Lined:
                     fail(path, line, "a key must be one word, not a list or mapping")
                 stack.append(_Open(line, {} if kind is yaml.MappingStartEvent else []))
                 continue
-            _check_text(event.value, path, line)
+            check_text(event.value, f"{path}, line {line}: this")
             if values > MAX_VALUES:
                 fail(path, line, f"the file holds more than {MAX_VALUES:,} values")
             if stack and stack[-1].needs_key:
@@ -178,13 +178,6 @@ def _refuse_clever(event: Any, kind: type, path: Path | str, line: int) -> None:
         fail(path, line, f"anchors and aliases ({shown('&' + str(event.anchor))}) are not read; write the value out")
     if event.tag is not None:
         fail(path, line, f"tags ({shown(str(event.tag))}) are not read; write the value without it")
-
-
-def _check_text(text: str, path: Path | str, line: int) -> None:
-    try:
-        check_text(text, "this")
-    except MotionloomError as error:
-        fail(path, line, str(error))
 
 
 def _add(opened: _Open, item: Lined, path: Path | str) -> None:
