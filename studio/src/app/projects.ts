@@ -46,7 +46,7 @@ export class Projects {
       this.app.session.update({ welcome: false, time: 0, playing: true, selection: { kind: "none" } });
       this.app.project.change("say what happens", (old) => ({
         ...old,
-        name: old.name === blankProject().name ? sentence.trim().slice(0, NAMED) : old.name,
+        name: old.name === blankProject().name ? Array.from(sentence.trim()).slice(0, NAMED).join("") : old.name,
         seed: seed ?? old.seed,
         segments: blocks.map((one) => segment(one.text, one.seconds)),
         frozen: [],

@@ -4,7 +4,7 @@ import { type MotionClip, POSE, motionClip } from "../body/clip";
 import { filed, stampOf } from "../project/file";
 import type { TimelineJson } from "../project/goals";
 import type { Note, Overlap, Project, Stamp, Take } from "../project/model";
-import { getJson, json, request } from "./http";
+import { getJson, json, plainJson, plainText, request } from "./http";
 import type { JobRequest } from "./types";
 
 export interface Result {
@@ -97,14 +97,14 @@ export function motionFile(id: string, format: Format, options: { skeleton?: str
 
 /** `asf`: the id of the skeleton that an AMC file needs. */
 export async function uploadMotion(file: File, asf: string | null = null): Promise<Result> {
-  const query = new URLSearchParams({ name: file.name, ...(asf ? { asf } : {}) });
+  const query = new URLSearchParams({ name: plainText(file.name), ...(asf ? { asf } : {}) });
   return getJson(`motions?${query}`, { method: "POST", body: file });
 }
 
 /** `joints`: which of its joints are which, as far as somebody said so. */
 export async function uploadCharacter(file: File, joints: Record<string, string> = {}): Promise<{ id: string }> {
-  const query = new URLSearchParams({ name: file.name });
-  if (Object.keys(joints).length) query.set("joints", JSON.stringify(joints));
+  const query = new URLSearchParams({ name: plainText(file.name) });
+  if (Object.keys(joints).length) query.set("joints", plainJson(joints));
   return getJson(`characters?${query}`, { method: "POST", body: file });
 }
 
@@ -159,7 +159,7 @@ export async function openProject(id: string): Promise<void> {
 /** A sentence as blocks: one for each action. */
 export async function blocksOf(sentence: string): Promise<readonly { text: string; seconds: number }[]> {
   type Found = { segments: { text: string; seconds: number }[] };
-  return (await getJson<Found>("sentence.json", { method: "POST", body: sentence })).segments;
+  return (await getJson<Found>("sentence.json", { method: "POST", body: plainText(sentence) })).segments;
 }
 
 /** Let the server keep what it has under another name, which is given. */

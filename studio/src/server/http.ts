@@ -51,8 +51,18 @@ export async function getJson<T>(path: string, init: RequestInit = {}): Promise<
   return (await request(path, init)).json() as Promise<T>;
 }
 
+/** Text as the server takes it: without control characters, and U+FFFD for half of an emoji that something cut. */
+export function plainText(text: string): string {
+  return text.replace(/[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]/g, "").replace(/[\ud800-\udfff]/gu, "\ufffd");
+}
+
+/** A value as JSON whose texts the server takes. */
+export function plainJson(value: unknown): string {
+  return JSON.stringify(value, (_, one: unknown) => (typeof one === "string" ? plainText(one) : one));
+}
+
 export function json(method: string, body: unknown): RequestInit {
-  return { method, body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
+  return { method, body: plainJson(body), headers: { "Content-Type": "application/json" } };
 }
 
 async function refusal(response: Response): Promise<Refused> {

@@ -1,7 +1,7 @@
 /** A live session over the server's WebSocket (docs/live.md): somebody who is steered while he moves. */
 
 import type { Vec3 } from "../project/model";
-import { webSocketAddress } from "./http";
+import { plainJson, webSocketAddress } from "./http";
 
 export interface Welcome {
   readonly type: "welcome";
@@ -48,7 +48,7 @@ export class LiveClient {
   }
 
   ask(type: string, fields: Record<string, unknown> = {}): void {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ type, ...fields }));
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(plainJson({ type, ...fields }));
   }
 
   leave(): void {

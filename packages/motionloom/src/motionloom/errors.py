@@ -55,11 +55,24 @@ def listed(keys: Collection[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+ELSEWHERE = {
+    "duration": "seconds",
+    "length": "seconds",
+    "text": "prompt",
+    "description": "prompt",
+    "cfg_scale": "guidance",
+    "guidance_scale": "guidance",
+    "num_samples": "count",
+}
+"""What other programs call fields, and their names here."""
+
+
 def meant(word: str, known: Collection[str]) -> str:
-    """What a message may add about a misspelt word: the known one that is like it, in brackets, if there is one."""
+    """What a message may add about a misspelt or foreign word: the known one that is like it, in brackets, if any."""
     import difflib  # here, since whoever makes no mistake need not wait for it
 
-    near = difflib.get_close_matches(word[:40], known, n=1)
+    same = ELSEWHERE.get(word)
+    near = [same] if same in known else difflib.get_close_matches(word[:40], known, n=1)
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
+from motionloom.reading import check_text
 
 LONGEST_NAME = 1000
 """Characters of a joint's name."""
@@ -68,6 +69,8 @@ class Skeleton:
         if len(set(self.names)) != len(self.names):
             twice = sorted(name for name, count in Counter(self.names).items() if count > 1)
             raise MotionloomError(f"joint names must be unique; {_some(twice)} appear more than once")
+        for name in self.names:
+            check_text(name, "a joint's name")
         longest = max(map(len, self.names))
         if longest > LONGEST_NAME:
             raise MotionloomError(f"a joint's name has {longest} characters; {LONGEST_NAME} are the most")

@@ -356,15 +356,18 @@ def test_the_table_has_a_row_for_every_row(weights: str, folder: Path) -> None:
         assert (Store(out, "npz").data(row["shard"]) / f"{row['id']}.npz").exists()
 
 
-def test_half_a_letter_in_a_prompt_is_written_everywhere(weights: str, folder: Path) -> None:
-    """JSON allows half of a surrogate pair, UTF-8 does not: the record keeps it, the table has a '?' in its place."""
-    parquet = pytest.importorskip("pyarrow.parquet")
-    out = folder / "out"
-    jobs = [{"prompt": "a person walks \ud800", "seconds": 0.6}, {"prompt": "", "id": "\udfff"}]
-    assert [one.state for one in batch(jobs, out, options=options(weights), where=ONE)] == ["made", "failed"]
-    assert next(read_batch(out)).about["text"] == "a person walks \ud800"
-    table = parquet.read_table(out / "metadata.parquet").to_pylist()
-    assert [row["text"] for row in table] == ["a person walks ?", None]
+def test_a_row_with_what_is_no_text_fails_in_a_sentence_and_the_others_are_made(weights: str, folder: Path) -> None:
+    """JSON allows half of a surrogate pair, UTF-8 does not; a key that stands twice says nothing."""
+    (folder / "jobs.jsonl").write_text(
+        '{"prompt": "a person walks \\ud800", "seconds": 0.6}\n{"prompt": "a", "seed": 1, "seed": 2}\n'
+        '{"prompt": "a \\u0007"}\n{"prompt": "a person walks", "seconds": 0.6}\n'
+    )
+    made = list(batch(folder / "jobs.jsonl", folder / "out", options=options(weights), where=ONE))
+    assert [one.state for one in made] == ["failed", "failed", "failed", "made"]
+    errors = [one.error or "" for one in made]
+    assert "half a character" in errors[0]
+    assert "stands in it twice" in errors[1]
+    assert "control character U+0007" in errors[2]
 
 
 def test_memory_of_the_driver_does_not_grow_with_the_job(folder: Path) -> None:

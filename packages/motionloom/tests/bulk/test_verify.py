@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from motionloom.bulk import writers
 from motionloom.bulk.batch import Where, batch, run
 from motionloom.bulk.claim import Driver
 from motionloom.bulk.jobs import Jobs
@@ -148,3 +149,30 @@ def test_counts_in_a_damaged_folder_are_not_counted_to(weights: str) -> None:
     report = verify(OUT)
     assert (report.shards, report.of) == (3, 2**63)
     assert report.damaged[0] == OUT / "records" / "000003.jsonl"
+
+
+def test_links_that_lead_out_of_the_folder_are_damage_and_are_not_followed(
+    weights: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A copy of each file, outside, would verify; so would hours of somebody's disk be read."""
+    make(weights)
+    away = Path("away")
+    away.mkdir()
+    for path in sorted(one for one in OUT.rglob("*") if one.is_file() and one.name != "table.json"):
+        path.rename(away / path.name)
+        path.symlink_to((away / path.name).absolute())
+        with monkeypatch.context() as patch:
+            patch.setattr("motionloom.bulk.writers.hash_file", _inside(path, writers.hash_file))
+            assert main(["batch", "--verify", "out"]) == 2, path
+        assert str(path) in "".join(capsys.readouterr())
+        path.unlink()
+        (away / path.name).rename(path)
+    assert main(["batch", "--verify", "out"]) == 0
+
+
+def _inside(link: Path, hash_file: Callable[[Path], str]) -> Callable[[Path], str]:
+    def hashed(path: Path) -> str:
+        assert path != link
+        return hash_file(path)
+
+    return hashed

@@ -1,6 +1,8 @@
-"""How many threads `motionloom serve` and `motionloom studio` sample with."""
+"""How `motionloom serve` and `motionloom studio` start, or do not."""
 
 import os
+import socket
+from pathlib import Path
 
 import pytest
 
@@ -27,3 +29,20 @@ def test_a_core_is_left_to_the_page(
         monkeypatch.delenv("MOTIONLOOM_THREADS")
     main([command])
     assert values == [expected]
+
+
+@pytest.mark.parametrize("why", ["port", "host", "token", "robot", "adapter"])
+def test_a_server_that_is_refused_leaves_no_folder(
+    tmp_path: Path, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        wrong = {
+            "port": ["--port", str(taken.getsockname()[1])],
+            "host": ["--host", "no.such.host.invalid", "--port", "0"],
+            "token": ["--token", "short"],
+            "robot": ["--robot", str(tmp_path / "absent.xml"), "--port", "0"],
+            "adapter": ["--adapter", str(tmp_path / "absent.safetensors")],
+        }[why]
+        assert main(["serve", *wrong, "--project", str(tmp_path / "mine" / "project")]) == 2
+    assert capsys.readouterr().err.startswith("motionloom")
+    assert list(tmp_path.iterdir()) == []

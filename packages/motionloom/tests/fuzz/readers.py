@@ -4,7 +4,7 @@ A new reader gets a place in one of the files imported here; their order is that
 """
 
 # isort: off
-from tests.fuzz import readers_of_jobs, readers_of_motions, readers_of_robots, readers_of_weights
+from tests.fuzz import readers_of_jobs, readers_of_motions, readers_of_robots, readers_of_servers, readers_of_weights
 from tests.fuzz.reader import READERS, Reader
 # isort: on
 
@@ -14,5 +14,6 @@ __all__ = [
     "readers_of_jobs",
     "readers_of_motions",
     "readers_of_robots",
+    "readers_of_servers",
     "readers_of_weights",
 ]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
+from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
 from motionloom.io.glb import read_document
 from motionloom.io.gltf_mesh import read_surfaces
@@ -16,10 +17,12 @@ from motionloom.io.gltf_read import load_glb_people
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
+from tests.fuzz.plain_mutations import LARGEST
 from tests.fuzz.reader import reader
 from tests.io.rigged import Hero, wave
 from tests.io.test_asf import AMC, ASF
 from tests.io.test_bvh import ARM
+from tests.shared import SHARED
 
 # Motions -------------------------------------------------------------------------------------------------------------
 
@@ -101,6 +104,44 @@ reader("gltf", gltf, {"a.gltf": "json"}, lambda f: [looked_at(m) for m in load_g
 reader("character", hero, {"a.glb": "glb"}, lambda f: carried(f / "a.glb"), weight=10)
 reader("npz", saved("a.npz"), {"a.npz": "npz"}, lambda f: looked_at(io.load(f / "a.npz")), weight=6)
 reader("npz of places", places, {"a.npz": "npz"}, lambda f: looked_at(io.load(f / "a.npz")), weight=3)
+
+
+# Rigs of other people, where they lie beside the repository -----------------------------------------------------------
+
+KINDS = {".bvh": "text", ".glb": "glb", ".vrm": "glb", ".vrma": "glb"}
+
+
+@cache
+def is_character(rig: Path) -> bool:
+    """Whether the sound file has meshes to be carried; else it is a motion."""
+    try:
+        load_character(rig)
+    except MotionloomError:
+        return False
+    return True
+
+
+def read_rig(rig: Path) -> Callable[[Path], None]:
+    character = rig.suffix != ".bvh" and is_character(rig)
+
+    def read(folder: Path) -> None:
+        place = folder / rig.name
+        try:
+            carried(place) if character else looked_at(io.load(place))
+        except MotionloomError:
+            if place.read_bytes() != rig.read_bytes():  # some are no persons, and are refused as they are
+                raise
+
+    return read
+
+
+def copied(rig: Path) -> Callable[[Path], object]:
+    return lambda folder: (folder / rig.name).write_bytes(rig.read_bytes())
+
+
+for rig in sorted((SHARED / "rigs").glob("*")):
+    if rig.suffix in KINDS and rig.stat().st_size < LARGEST:
+        reader(f"rig {rig.name[:18]}", copied(rig), {rig.name: KINDS[rig.suffix]}, read_rig(rig), weight=1)
 
 
 # What is asked -------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 
 from tests.fuzz.reader import reader
 from tests.robots import models
+from tests.shared import SHARED
 
 
 def model(folder: Path) -> None:
@@ -54,7 +55,30 @@ def read_angles(suffix: str) -> Any:
     return read
 
 
+def urdf(folder: Path) -> None:
+    from tests.robots.test_models import as_urdf
+
+    (folder / "tin.urdf").write_text(as_urdf(robot(folder)))
+
+
+def read_urdf(folder: Path) -> object:
+    from motionloom.robots.body import read_robot
+
+    return read_robot(folder / "tin.urdf")
+
+
+G1 = SHARED / "robots" / "unitree_g1" / "g1_29dof_without_meshes.xml"
+
+
+def g1(folder: Path) -> None:
+    """A robot as its maker publishes it, where it lies beside the repository."""
+    (folder / "tin.xml").write_bytes(G1.read_bytes())
+
+
 if find_spec("mujoco") and find_spec("mink"):
+    reader("URDF of a robot", urdf, {"tin.urdf": "svg"}, read_urdf, weight=3)
     reader("model of a robot", model, {"tin.xml": "svg"}, read_model, weight=3)
     reader("joint angles in a CSV", angles(".csv"), {"a.csv": "text"}, read_angles(".csv"), weight=5)
     reader("joint angles in an NPZ", angles(".npz"), {"a.npz": "npz"}, read_angles(".npz"), weight=3)
+    if G1.is_file():
+        reader("published robot", g1, {"tin.xml": "svg"}, read_model, weight=2)

@@ -358,7 +358,7 @@ def test_the_schema_has_the_readers_keys():
 SMALL = st.fixed_dictionaries(
     {},
     optional={
-        "text": st.sampled_from(["walk", "", " ", 5, None, "x" * 20_000, "x" * 20_001, ["a"]]),
+        "text": st.sampled_from(["walk", "", " ", 5, None, "x" * 2_000, "x" * 2_001, ["a"]]),
         "seconds": st.sampled_from([5, 0.2, 0.19, 60, 60.1, 0, "5", None, True]),
         "guidance": st.sampled_from([0, 2.5, 100, -100, 100.5, "a"]),
         "transition": st.sampled_from([0.05, 0.1, 0, "a", None]),

@@ -14,7 +14,7 @@ from motionloom import rotations as rot
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
-from motionloom.io.npz import load_npz, save_npz
+from motionloom.io.npz import load_npz, read_array, save_npz
 from motionloom.motion import Motion
 from motionloom.retarget import retarget, to_smpl22
 from motionloom.retarget.upright import AXES
@@ -218,6 +218,22 @@ def test_a_shape_that_promises_more_than_is_there_is_refused_at_once(tmp_path):
         archive.writestr("rotations.npy", header.getvalue())
     with pytest.raises(MotionloomError, match="damaged"):
         io.load(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ["(" * 3000 + ")" * 3000, "-" * 9000 + "1", "1" + "+1" * 4000, "not " * 2400 + "1", "a" + ".a" * 4000, "~" * 9000],
+)
+def test_a_head_that_would_take_the_interpreters_stack_is_refused_before_it_is_parsed(tmp_path, shape):
+    """NumPy reads heads as Python; what is deep ended in a RecursionError or MemoryError that a sentence hid."""
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(9990) + b"\n"
+    (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\x01\0" + len(head).to_bytes(2, "little") + head)
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.write(tmp_path / "a.npy", "rotations.npy")
+    for read in (lambda: read_array(tmp_path / "a.npy"), lambda: io.load(tmp_path / "a.npz")):
+        with pytest.raises(MotionloomError, match="ValueError") as refused:
+            read()
+        assert isinstance(refused.value.__context__, ValueError)
 
 
 def test_an_archive_that_unpacks_to_gigabytes_is_refused_before_unpacking(tmp_path):

@@ -224,7 +224,7 @@ def test_a_key_that_stands_twice_behind_many_others_is_found_at_once(tmp_path: P
         return tmp_path / f"{count}.json"
 
     for path in (write(1000), write(90_000)):
-        with pytest.raises(MotionloomError, match="'twice' appears twice in one mapping"):
+        with pytest.raises(MotionloomError, match="the key 'twice' stands in it twice"):
             read_goal(path, frames=20, folder=tmp_path)
 
 

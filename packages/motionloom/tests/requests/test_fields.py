@@ -25,7 +25,7 @@ SOURCE = Path(motionloom.__file__).parent
     [
         ({}, "the task 'generate' has no 'prompt'; it needs prompt"),
         ({"prompt": " "}, "a prompt is empty; say in words what the person does"),
-        ({"prompt": "x" * 20_001}, "a prompt has 20,001 characters; say it in at most 20,000"),
+        ({"prompt": "x" * 2_001}, "a prompt has 2,001 characters; say it in at most 2,000"),
         ({"prompt": 3}, "'prompt' must be text; got 3"),
         ({"prompt": "a", "secnds": 1}, "has no 'secnds' (did you mean 'seconds'?); it has prompt, "),
         ({"prompt": "a", "seconds": 0}, "'seconds' must be above 0 and at most 60 seconds; got 0"),

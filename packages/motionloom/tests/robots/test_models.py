@@ -166,7 +166,7 @@ def test_a_model_without_actuators_and_one_with_a_fixed_base_are_told(tmp_path: 
     assert any("set free" in note for note in robot.notes)
 
 
-def _as_urdf(robot: Robot) -> str:
+def as_urdf(robot: Robot) -> str:
     """The robot's tree as URDF, hinges in the model's own order."""
     model, parts = robot.file.model, []
     inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -192,7 +192,7 @@ def _as_urdf(robot: Robot) -> str:
 def test_urdf_is_read_with_its_speeds(tmp_path: Path) -> None:
     """MuJoCo drops a URDF's speeds and welds its base to the world; both are put right."""
     plain = read(tmp_path, models.humanoid())
-    robot = read_robot(written(tmp_path, _as_urdf(plain), "robot.urdf"))
+    robot = read_robot(written(tmp_path, as_urdf(plain), "robot.urdf"))
     assert robot.file.joint_names() == plain.file.joint_names()
     assert robot.file.speed.tolist() == [4.0 + row for row in range(len(robot.file.hinges))]
     thigh = robot.skeleton.index("left_knee")
@@ -222,7 +222,7 @@ def test_meshes_of_a_ros_package_are_found(where: str, tmp_path: Path) -> None:
     for row, side in enumerate((*sides, (1, 5, 7), (1, 7, 3))):
         faces["corners"][row] = np.concatenate([corners[i] for i in side])
     (tmp_path / "tin" / "meshes" / "foot.stl").write_bytes(bytes(80) + (12).to_bytes(4, "little") + faces.tobytes())
-    text = _as_urdf(read(tmp_path, models.humanoid()))
+    text = as_urdf(read(tmp_path, models.humanoid()))
     mesh = '<collision><geometry><mesh filename="package://tin/meshes/foot.stl"/></geometry></collision>'
     for side in ("left", "right"):
         start = text.index(f'<link name="{side}_foot_b">')

@@ -97,3 +97,41 @@ def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
     assert "there is no motion" in json.dumps(refused.model_dump(mode="json"))
     assert escaped.is_error
     assert not (tmp_path / "evil.bvh").exists()
+
+
+def test_unknown_arguments_are_refused_with_the_name_that_was_meant(tmp_path: Path) -> None:
+    _, (length, misspelt, file, text, inner) = talk(
+        tmp_path,
+        ("generate_motion", {"prompt": "a person jumps", "duration": 2}),
+        ("control", {"prompt": "a person jumps", "gaols": {}}),
+        ("export", {"motion": "0" * 16, "nmae": "walk"}),
+        ("generate_motion", {"prompt": "a person \u0007 jumps"}),
+        ("compose", {"timeline": {"segments": [{"text": "a person walks", "secnds": 1}]}}),
+    )
+    assert all(one.is_error for one in (length, misspelt, file, text, inner))
+    assert "generate_motion has no 'duration' (did you mean 'seconds'?); it has prompt, " in length.content[0].text
+    assert "control has no 'gaols' (did you mean 'goals'?)" in misspelt.content[0].text
+    assert "export has no 'nmae' (did you mean 'name'?)" in file.content[0].text
+    assert "'prompt' holds the control character U+0007" in text.content[0].text
+    assert "unknown key 'secnds' (did you mean 'seconds'?)" in inner.content[0].text
+
+
+def test_the_schemas_of_tools_allow_nothing_else(tmp_path: Path) -> None:
+    from motionloom.server.assistant import Assistant, strict
+    from motionloom.server.job_request import TASKS
+    from motionloom.server.limits import Limits
+    from motionloom.server.project import Project
+    from motionloom.server.worker import Worker
+
+    tools = Assistant(project := Project(tmp_path, Limits()), Worker(project, Limits()))
+    for tool in map(strict, (*map(tools.tool, TASKS), tools.export)):
+        objects = [tool.parameters]
+        for one in objects:
+            objects += [inner for inner in _values(one) if isinstance(inner, dict)]
+        described = [one for one in objects if one.get("type") == "object" and "properties" in one]
+        assert described
+        assert all(one["additionalProperties"] is False for one in described), tool.name
+
+
+def _values(value: Any) -> list[Any]:
+    return [*value.values()] + [one for each in value.values() if isinstance(each, list) for one in each]

@@ -24,7 +24,7 @@ from typing import Any
 from motionloom.bulk.maker import Options, hash_weights
 from motionloom.bulk.measures import MEANING, ROBOT
 from motionloom.bulk.row import FORMAT, hash_file
-from motionloom.bulk.writers import hashes, json_line, sizes, suffix, sync
+from motionloom.bulk.writers import hashes, json_line, leads_out, sizes, suffix, sync
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.folder import check_folder
@@ -139,6 +139,8 @@ class Store:
 
     def _record(self, shard: int) -> tuple[Head, list[Entry]] | None:
         """The record of a shard, if it is whole."""
+        if leads_out(self.record(shard), self.out):
+            return None
         try:
             first, *lines = self.record(shard).read_bytes().splitlines()
             head, entries = Head(**json.loads(first)), [json.loads(line) for line in lines]
@@ -255,6 +257,8 @@ def read_manifest(out: Path, *, anew: bool = False) -> dict[str, Any] | None:
             raise _damaged(f"{place} is lost")
         raise MotionloomError(f"{out} holds other files and no {MANIFEST}; name a folder of its own for the batch")
     try:
+        if leads_out(place, out):
+            raise ValueError("a link")
         manifest = json.loads(place.read_text(encoding="utf-8"))
         whole = CHECK not in manifest or manifest[CHECK] == _hash_manifest(manifest)
     except (OSError, ValueError, TypeError, RecursionError):

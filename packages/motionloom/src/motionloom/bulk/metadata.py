@@ -16,11 +16,12 @@ from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, find_ba
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import ROBOT
 from motionloom.bulk.row import hash_file
-from motionloom.bulk.writers import file_names, json_line, parquet_schema, well_formed
+from motionloom.bulk.writers import file_names, json_line, leads_out, parquet_schema
 from motionloom.errors import MotionloomError
 from motionloom.io import load, load_scene
 from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
+from motionloom.reading import mended, read_bytes
 from motionloom.skeleton import Skeleton
 
 TABLE, ABOUT_TABLE = "metadata", "table.json"
@@ -51,6 +52,8 @@ def damaged_table(store: Store) -> Path | None:
     """The table where it is lost or not as it was written; None: it is well, as far as is known."""
     places = [store.out / f"{TABLE}.{kind}" for kind in ("parquet", "jsonl")]
     place = next((one for one in places if one.exists()), places[0])
+    if leads_out(place, store.out):
+        return place
     try:
         known = _about_table(store).get(place.name, hash_file(place))
         return None if hash_file(place) == known else place
@@ -66,7 +69,7 @@ def table_shards(store: Store) -> int:
 def _about_table(store: Store) -> dict[str, Any]:
     """The table's hash by its name, and of how many shards it is; what is not known is left out."""
     try:
-        about = json.loads((store.out / RECORDS / ABOUT_TABLE).read_bytes())
+        about = json.loads(read_bytes(store.out / RECORDS / ABOUT_TABLE, max_bytes=1 << 20))
         return {str(about["file"]): str(about["sha256"]), "shards": int(about["shards"])}
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return {}
@@ -78,7 +81,7 @@ def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
     schema = pa.schema([*((name, getattr(pa, kind)()) for name, kind in _ABOUT.items()), *known])
     with parquet().ParquetWriter(path, schema, compression="zstd") as file:
         while part := list(islice(entries, _BLOCK)):
-            rows = [{name: well_formed(value) for name, value in entry.items()} for entry in part]
+            rows = [mended(entry) for entry in part]
             file.write_table(pa.Table.from_pylist(rows, schema=schema))
 
 

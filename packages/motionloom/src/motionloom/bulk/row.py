@@ -20,10 +20,11 @@ from motionloom.goals.goal_file import read_goal
 from motionloom.goals.roles import MARK, prompts_of
 from motionloom.goals.timeline import SHORTEST, Timeline, read_timeline, timeline_of
 from motionloom.io import load
+from motionloom.io.text import parse_json
 from motionloom.motion import Motion
 from motionloom.requests.batch import RowKeys
 from motionloom.requests.reading import read
-from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
+from motionloom.requests.shared import LONGEST, LONGEST_LINE
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.text import frames_in
 
@@ -90,7 +91,7 @@ class Order:
         """What the motion shows, in words."""
         if self.timeline is None or self.row.prompt:
             return self.row.words or self.row.motion or ""
-        return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_PROMPT]
+        return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_LINE]
 
 
 class Unexpected(MotionloomError):
@@ -148,9 +149,9 @@ def parse(raw: bytes) -> Row:
 def _columns(raw: bytes) -> dict[str, Any]:
     """The columns of a row that hold something."""
     try:
-        row = json.loads(raw)
-    except (ValueError, RecursionError) as error:
-        raise MotionloomError(f"the row is no JSON ({error}); write one object per line") from None
+        row = parse_json(raw, "the row")
+    except MotionloomError as error:
+        raise MotionloomError(f"{error}; write one object per line") from None
     if not isinstance(row, dict):
         raise MotionloomError('the row is no JSON object; write one object per line, such as {"prompt": "..."}')
     return {key: value for key, value in row.items() if value is not None}
@@ -162,10 +163,7 @@ def _goal(goal: Any) -> str | dict[str, Any] | None:
         raise MotionloomError("'goal' must be the name of a goal file or a mapping of its keys")
     if not (isinstance(goal, str) and goal.lstrip().startswith("{")):
         return goal
-    try:
-        return json.loads(goal)
-    except (ValueError, RecursionError) as error:
-        raise MotionloomError(f"'goal' is no JSON ({error})") from None
+    return parse_json(goal, "'goal'")
 
 
 def _task(task: str | None, goal: bool, timeline: bool, motion: bool) -> str:

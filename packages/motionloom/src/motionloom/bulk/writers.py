@@ -24,6 +24,7 @@ from motionloom.io import save, save_scene
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.npz import save_npz
 from motionloom.motion import Motion
+from motionloom.reading import mended
 
 ROWS = 64
 """Motions of a row group of a Parquet file: how many are in memory at once."""
@@ -198,7 +199,7 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
     skeleton = people[0].skeleton  # both are on the same one
     return {
         **about,
-        "text": well_formed(about["text"]),
+        "text": mended(about["text"]),
         "joints": len(skeleton),
         "positions": flat(*(motion.positions() for motion in people)),
         "rotations": flat(*(motion.rotations for motion in people)),
@@ -207,11 +208,6 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
         "parents": list(skeleton.parents),
         "offsets": flat(skeleton.offsets),
     }
-
-
-def well_formed(value: Any) -> Any:
-    """Text that has UTF-8: half of a surrogate pair becomes '?'; anything else as it is."""
-    return value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
 
 
 def json_line(value: dict[str, Any]) -> bytes:
@@ -244,13 +240,24 @@ def sizes(path: Path) -> dict[str, int]:
     return {"files": len(places), "bytes": sum(place.stat().st_size for place in places)}
 
 
+def leads_out(place: Path, folder: Path) -> bool:
+    """Whether a link on the way makes ``place`` a file outside of the folder."""
+    try:
+        return not place.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # links that lead to each other
+        return True
+
+
 def hashes(path: Path) -> dict[str, str]:
-    """SHA-256 of a shard's files by their names; of a shard that is one file, that one's. Empty: it cannot be read."""
+    """SHA-256 of a shard's files by their names; of a shard that is one file, that one's.
+
+    Empty: it cannot be read, or is a link that leads out of the batch's folder.
+    """
     digests = {}
     for place in sorted(_files(path)):
         name = place.name if place != path else ""
         try:
-            digests[name] = hash_file(place)
+            digests[name] = "" if leads_out(place, path.parent) else hash_file(place)
         except OSError:
             digests[name] = ""
     return digests

@@ -1,6 +1,7 @@
 """`motionloom compose`: a long motion from a timeline file or from several prompts."""
 
 import json
+import os
 from argparse import Namespace
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
@@ -80,6 +81,9 @@ def _timeline(arguments: Namespace, metre: float) -> Timeline:
     words: list[str] = arguments.segments
     files = [word for word in words if word.lower().endswith((".yaml", ".yml"))]
     if not files:
+        for word in words:
+            if ("/" in word or "." in word) and not word.isspace() and os.path.lexists(word):
+                fail(f"{word} is a file and no words; a timeline file's name ends in .yaml")
         seconds = timeline.SECONDS if arguments.seconds is None else arguments.seconds
         return timeline.plain_timeline(words, seconds=seconds, transition=arguments.transition)
     if len(words) > 1:

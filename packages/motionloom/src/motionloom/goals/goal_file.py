@@ -4,8 +4,6 @@
 a JSON Schema.
 """
 
-import json
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,7 +21,7 @@ from motionloom.goals.reach import check_reach
 from motionloom.goals.schemas import GOAL_JOINTS
 from motionloom.ground import GroundPose
 from motionloom.io import load
-from motionloom.io.text import read_text
+from motionloom.io.text import parse_json, read_text
 from motionloom.motion import Motion, ground_pose
 from motionloom.requests import goal as keys
 from motionloom.requests.goal import FARTHEST, MAX_FRAMES
@@ -53,36 +51,10 @@ def read_goal(
     if isinstance(source, Mapping):
         return _Reader(frames, fps, folder, metre).goal(Field(source))
     path = Path(source)
-    values = _read_json(path)
+    values = parse_json(read_text(path, max_bytes=MAX_BYTES), path)
     if isinstance(values, dict):
         values.pop("$schema", None)  # for editors
     return _Reader(frames, fps, path.parent, metre).goal(Field(values, source=str(path)))
-
-
-def _read_json(path: Path) -> Any:
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        mapping = dict(pairs)
-        if len(mapping) < len(pairs):
-            twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
-            raise MotionloomError(f"{path}: the key {twice[:40]!r} appears twice in one mapping; remove one of them")
-        return mapping
-
-    def constant(word: str) -> float:
-        raise MotionloomError(f"{path}: {word} is not a number that anybody can reach; write finite numbers")
-
-    data = read_text(path, max_bytes=MAX_BYTES)
-    try:
-        return json.loads(data.decode("utf-8"), object_pairs_hook=unique, parse_constant=constant)
-    except json.JSONDecodeError as error:
-        raise MotionloomError(f"{path}, line {error.lineno}: this is not JSON: {error.msg}") from None
-    except UnicodeDecodeError:
-        raise MotionloomError(f"{path} is not UTF-8 text; save it as UTF-8") from None
-    except RecursionError:
-        raise MotionloomError(f"{path}: values lie in each other too deep") from None
-    except ValueError as error:
-        if isinstance(error, MotionloomError):
-            raise
-        raise MotionloomError(f"{path}: a number has too many digits") from None
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from motionloom.goals.sequence import Part, lengths, split_actions, usual_second
 from motionloom.goals.verbs import in_plainer_words, subject_of
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
 from motionloom.io.text import plain_text
+from motionloom.reading import check_text
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
 from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
@@ -282,6 +283,10 @@ def _text_problem(text: str) -> str:
         return "the text is empty; say in words what the person does"
     if len(text) > LONGEST_PROMPT:
         return f"the text has {len(text):,} characters; say it in at most {LONGEST_PROMPT:,}"
+    try:
+        check_text(text, "the text")
+    except MotionloomError as error:
+        return str(error)
     return ""
 
 

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 from motionloom.errors import MotionloomError, kind_of
 from motionloom.io.text import read_text, shown
+from motionloom.reading import check_text
 
 MAX_DEPTH = 32
 MAX_ITEMS = 200_000
@@ -152,6 +153,7 @@ def _build(events: Iterator[Any], path: Path | str) -> Lined:
                     fail(path, line, "a key must be one word, not a list or mapping")
                 stack.append(_Open(line, {} if kind is yaml.MappingStartEvent else []))
                 continue
+            check_text(event.value, f"{path}, line {line}: this")
             if values > MAX_VALUES:
                 fail(path, line, f"the file holds more than {MAX_VALUES:,} values")
             if stack and stack[-1].needs_key:

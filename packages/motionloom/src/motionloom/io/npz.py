@@ -28,6 +28,7 @@ archives come in other units and with other axes up: what is surely not metres, 
 
 import io
 import math
+import re
 import struct
 import tokenize
 import warnings
@@ -55,6 +56,10 @@ _POSITIONS = ("positions", "joints", "motion", "arr_0")
 SPARE_NUMBERS, NUMBERS_PER_BYTE = 8_000_000, 16
 """What a packed file may unfold to: so many numbers, or so many for each byte of the file, if that is more. Motion that
 people make packs to a byte for each number or two; somebody who does not move at all, for forty minutes, is let in."""
+LONGEST_HEAD = 10_000
+DEEPEST_HEAD = 64
+"""Bytes and brackets of what stands before the numbers of an array."""
+_HEAD = re.compile(rb"""(?:[\s,:{}()\[\]0-9L]|True|False|'[^'\\\n]*'|"[^"\\\n]*")*""")
 BROKEN = (
     zipfile.BadZipFile,
     zlib.error,
@@ -213,8 +218,16 @@ def read_array(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> np.ndarr
 def read_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype]:
     """Shape, whether columns come first, and type of the .npy that begins where the stream is; raises `BROKEN`."""
     version = np.lib.format.read_magic(stream)
-    reader = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-    shape, fortran, dtype = reader(stream)
+    reader, width = {
+        (1, 0): (np.lib.format.read_array_header_1_0, 2),
+        (2, 0): (np.lib.format.read_array_header_2_0, 4),
+    }[version]
+    length = stream.read(width)
+    head = stream.read(min(int.from_bytes(length, "little"), LONGEST_HEAD))
+    # NumPy parses it as Python: what is deep or full of signs would take the interpreter's stack
+    if not _HEAD.fullmatch(head) or sum(map(head.count, (b"(", b"[", b"{"))) > DEEPEST_HEAD:
+        raise ValueError("it has no head that NumPy writes")
+    shape, fortran, dtype = reader(io.BytesIO(length + head))
     if len(shape) > 32 or not all(type(n) is int and 0 <= n < 1 << 62 for n in shape):
         raise ValueError("it has no shape")
     return shape, fortran, dtype

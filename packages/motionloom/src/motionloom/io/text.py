@@ -3,6 +3,7 @@
 import json
 import math
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError, quoted
 from motionloom.motion import MAX_POSES
-from motionloom.reading import MAX_BYTES, read_bytes
+from motionloom.reading import MAX_BYTES, check_texts, mended, read_bytes, whole_number
 
 LIMIT = 1e9
 """Numbers beyond this are no lengths or angles of anybody, and are refused with NaN and infinity."""
@@ -46,18 +47,34 @@ def read_utf8(path: Path | str, *, max_bytes: int, empty: bool = False) -> str:
 
 
 def parse_json(data: bytes | str, what: Path | str) -> Any:
-    """What JSON says, with finite numbers only; raises `MotionloomError` that begins with ``what``."""
+    """What JSON from outside says: finite numbers, each key once, and texts that are texts (`reading.check_text`).
+
+    Raises `MotionloomError` that begins with ``what``.
+    """
+    value = _json(data, what, unique=True)
+    check_texts(value, str(what))
+    return value
+
+
+def stored_json(data: bytes, what: Path | str) -> Any:
+    """What JSON says that was stored here: of a key that stands there twice the last value counts, and U+FFFD stands
+    for what is no text. Raises `MotionloomError` as `parse_json`.
+    """
+    return mended(_json(data, what, unique=False))
+
+
+def _json(data: bytes | str, what: Path | str, *, unique: bool) -> Any:
     try:
-        return plain_json(data, finite=True)
+        return plain_json(data, finite=True, unique=unique)
     except ValueError as error:
         raise MotionloomError(f"{what} is not JSON ({' '.join(str(error).split())[:120]})") from None
 
 
-def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
-    """What JSON says, lying in each other at most `MAX_DEPTH` deep; ``finite``: without NaN, infinity and 1e999.
+def plain_json(data: bytes | str, *, finite: bool = False, unique: bool = False) -> Any:
+    """What JSON says, lying in each other at most `MAX_DEPTH` deep.
 
-    Raises ValueError for anything else: what is not UTF-8, endless digits, and depths at which whoever copies or shows
-    the values runs out of stack.
+    finite: without NaN, infinity and 1e999. unique: no key stands twice in an object. Raises ValueError for anything
+    else: what is not UTF-8, endless digits, and depths at which whoever copies or shows the values runs out of stack.
     """
 
     def constant(name: str) -> float:
@@ -72,7 +89,13 @@ def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
         return value
 
     try:
-        value = json.loads(data, parse_constant=constant, parse_float=number)
+        value = json.loads(
+            data,
+            parse_constant=constant,
+            parse_float=number,
+            parse_int=whole_number,
+            object_pairs_hook=_unique if unique else None,
+        )
     except RecursionError:
         raise ValueError("its values lie in each other too deep") from None
     layer = [value]
@@ -83,6 +106,14 @@ def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
     raise ValueError("its values lie in each other too deep")
 
 
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    mapping = dict(pairs)
+    if len(mapping) < len(pairs):
+        twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"the key {quoted(twice)} stands in it twice; leave one of them out")
+    return mapping
+
+
 def _inside(value: Any) -> Iterable[Any]:
     if isinstance(value, dict):
         return value.values()
@@ -90,11 +121,11 @@ def _inside(value: Any) -> Iterable[Any]:
 
 
 def word(raw: bytes) -> str:
-    """Bytes as text that is safe to print: UTF-8 where it is, Latin-1 where it is not."""
+    """Bytes as text: UTF-8 where it is, else Windows-1252, which is Latin-1 without its control characters."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
-        return raw.decode("latin-1")
+        return raw.decode("cp1252", "replace")
 
 
 def shown(raw: bytes | str, limit: int = 40) -> str:

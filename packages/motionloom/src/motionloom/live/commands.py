@@ -48,8 +48,6 @@ class Say(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.text.isascii() and any("\ud800" <= letter <= "\udfff" for letter in self.text):
-            raise MotionloomError("text holds half a letter (a lone surrogate); send whole ones")
         object.__setattr__(self, "text", " ".join(self.text.split()))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from motionloom.requests.export import OnSkeleton
 from motionloom.requests.fields import declare, like
 from motionloom.requests.sampling import PairSampling, Sampling
-from motionloom.requests.shared import LONGEST_PROMPT, Finish, OnRobot
+from motionloom.requests.shared import LONGEST_LINE, Finish, OnRobot
 from motionloom.requests.tasks import Generate
 
 TASKS = ("generate", "control", "compose", "duet", "export")
@@ -21,12 +21,12 @@ class RowKeys(OnRobot):
     seconds: float | None = like(Generate, "seconds")
     seed: int | None = like(Sampling, "seed", "the same seed makes the same motion", default=None)
     best_of: int | None = like(Sampling, "best_of", default=None)
-    timeline: str | None = declare("text", "name of a timeline file", high=LONGEST_PROMPT)
+    timeline: str | None = declare("text", "name of a timeline file", high=LONGEST_LINE)
     goal: Any = declare("goal", "name of a goal file, or a mapping of its keys")
-    motion: str | None = declare("text", "name of a file with a recording, which is put on", high=LONGEST_PROMPT)
+    motion: str | None = declare("text", "name of a file with a recording, which is put on", high=LONGEST_LINE)
     person: int | None = declare("whole", "whose the goal is of two people, or a timeline's path", low=1, high=2)
-    skeleton: str | None = declare("text", "file with the skeleton that the motion is put on", high=LONGEST_PROMPT)
-    id: str | None = declare("text", "name of the motion's files", high=LONGEST_PROMPT)
+    skeleton: str | None = declare("text", "file with the skeleton that the motion is put on", high=LONGEST_LINE)
+    id: str | None = declare("text", "name of the motion's files", high=LONGEST_LINE)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from motionloom.requests.fields import Checked, declare
-from motionloom.requests.shared import LONGEST_PROMPT
+from motionloom.requests.shared import LONGEST_LINE
 
 FORMATS = ("bvh", "glb", "npz", "mp4", "png", "html")
 """What the server and assistants write; the command line goes by the file's name."""
@@ -19,7 +19,7 @@ RATE = "frames per second"
 class OnSkeleton(Checked):
     """A skeleton that motions are put on, and how."""
 
-    skeleton: str | None = declare("text", "smpl22, mixamo, unreal, vrm, rigify or a character", high=LONGEST_PROMPT)
+    skeleton: str | None = declare("text", "smpl22, mixamo, unreal, vrm, rigify or a character", high=LONGEST_LINE)
     root: str | None = declare(
         "word",
         "what carries the way over the ground on a skeleton with a root bone: that bone (motion), the hips, or nothing",

@@ -13,6 +13,7 @@ from numbers import Real
 from typing import Any, NoReturn, TypedDict, Unpack
 
 from motionloom.errors import MotionloomError, kind_of, meant
+from motionloom.reading import check_text
 
 _PARSERS: Mapping[str, Callable[[str], Any]] = {
     "whole": int,
@@ -102,6 +103,7 @@ class Spec:
         if not isinstance(value, str):
             _wrong(place, "must be text", value)
         what = "a prompt" if place.strip("'") == "prompt" else place
+        check_text(value, what)
         if self.hint and not value.strip():
             raise MotionloomError(f"{what} is empty; {self.hint}")
         if len(value) > self.high:

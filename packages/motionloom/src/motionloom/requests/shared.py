@@ -7,8 +7,10 @@ from motionloom.requests.fields import Checked, declare
 
 LONGEST = 60.0
 """Seconds: beyond this one prompt is no longer one action."""
-LONGEST_PROMPT = 20_000
-"""Characters."""
+LONGEST_PROMPT = 2_000
+"""Characters of a prompt, for every interface: the longest of HumanML3D has 897."""
+LONGEST_LINE = 20_000
+"""Characters of other texts, such as names of files."""
 SAMPLED = ("seed", "count", "guidance", "steps", "best_of")
 """Fields of sampling that most tasks have."""
 
@@ -27,8 +29,8 @@ def seconds(help: str, default: float | None = None, *, high: float = LONGEST) -
 class OnRobot(Checked):
     """A humanoid robot that motions are put on, and how."""
 
-    robot: str | None = declare("text", "a humanoid robot's model: joint angles are made", high=LONGEST_PROMPT)
-    robot_map: str | None = declare("text", "JSON file: which joints of the robot are which", high=LONGEST_PROMPT)
+    robot: str | None = declare("text", "a humanoid robot's model: joint angles are made", high=LONGEST_LINE)
+    robot_map: str | None = declare("text", "JSON file: which joints of the robot are which", high=LONGEST_LINE)
     max_speed: float | None = declare(
         "number", "speed that no joint of the robot exceeds; without it the model's", low=0.1, high=1000, unit="rad/s"
     )
@@ -51,7 +53,7 @@ class Adapted(Checked):
         "text",
         "what 'motionloom teach' made: FILE for sentences like what it was taught, FILE:FACTOR for all",
         (),
-        high=LONGEST_PROMPT,
+        high=LONGEST_LINE,
         many=16,
     )
 

@@ -5,6 +5,7 @@ import base64
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from functools import wraps
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,14 +18,15 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, listed, meant, quoted
 from motionloom.io.text import parse_json
+from motionloom.reading import check_text
 from motionloom.requests.export import FORMATS, Export
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import parse_fields, read
 from motionloom.retarget.named import NAMED
 from motionloom.server import page as built
-from motionloom.server.bodies import body_of, file_of, file_once
+from motionloom.server.bodies import body_of, file_of, file_once, session_of
 from motionloom.server.films import film
 from motionloom.server.guard import Door, Guard
 from motionloom.server.job_request import TASKS, read_request
@@ -87,8 +89,43 @@ def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRo
     return app
 
 
+QUERIES: Mapping[str, tuple[str, ...]] = {
+    "/jobs/{id}/events": ("after",),
+    "/motions": ("name", "asf"),
+    "/motions/{name}": ("looks", *(name for name in specs(Export) if name not in ("motion", "format", "name"))),
+    "/motions/{id}/deeds": ("begin", "end"),
+    "/characters": ("name", "joints"),
+    "/project": ("over",),
+    "/project/open": ("id",),
+}
+"""What may follow the ``?`` of an address, beside a token; of all others nothing."""
+
+
 def routes(*, page: bool = True) -> list[BaseRoute]:
     """What is answered; ``page``: with the files of the studio's page."""
+    return [
+        *map(_with_known_query, _answers()),
+        WebSocketRoute("/film", film),
+        *mmcp_routes(),
+        *(built.routes() if page else ()),
+    ]
+
+
+def _with_known_query(route: Route) -> Route:
+    """The route, which refuses what it does not know behind a ``?``."""
+    known = (*QUERIES.get(route.path, ()), "token")
+
+    @wraps(route.endpoint)
+    async def answer(request: Request) -> Response:
+        if unknown := [key for key in request.query_params if key not in known]:
+            hint = f"{quoted(unknown[0])}{meant(unknown[0], known)}; it takes {listed(known)}"
+            raise Refusal(400, f"{request.url.path[:80]} takes no {hint}")
+        return await route.endpoint(request)
+
+    return Route(route.path, answer, methods=sorted(route.methods or ()))
+
+
+def _answers() -> list[Route]:
     return [
         Route("/health", health),
         Route("/capabilities", capabilities),
@@ -100,15 +137,12 @@ def routes(*, page: bool = True) -> list[BaseRoute]:
         Route("/motions/{id}/deeds", deeds),
         Route("/characters", upload_character, methods=["POST"]),
         Route("/characters/{id}", character),
-        WebSocketRoute("/film", film),
         *project_routes(),
         Route("/timeline.yaml", timeline_to_yaml, methods=["POST"]),
         Route("/timeline.json", timeline_to_json, methods=["POST"]),
         Route("/sentence.json", sentence_to_json, methods=["POST"]),
-        *mmcp_routes(),
         Route("/openapi.json", openapi),
         Route("/docs", docs),
-        *(built.routes() if page else ()),
     ]
 
 
@@ -166,9 +200,8 @@ async def make_job(request: Request) -> Response:
 
 def client_of(request: Request) -> str:
     """The client: the session that a page names in X-Client, else the address."""
-    address = request.client.host if request.client else "unknown"
-    named = request.headers.get("x-client", "")
-    return f"{address} {named[:64]}" if named else address
+    address, named = request.client.host if request.client else "unknown", session_of(request)
+    return f"{address} {named}" if named else address
 
 
 async def show_job(request: Request) -> Response:
@@ -289,7 +322,7 @@ async def sentence_to_json(request: Request) -> Response:
 async def _text_of(request: Request, what: str) -> str:
     body = await body_of(request, studio_of(request).limits.body_bytes)
     try:
-        return body.decode("utf-8")
+        return check_text(body.decode("utf-8"), f"the {what}")
     except UnicodeDecodeError:
         raise MotionloomError(f"the {what} is not UTF-8 text; save it as UTF-8") from None
 

@@ -15,8 +15,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, listed, meant, quoted
 from motionloom.goals.adapters import Applied
+from motionloom.reading import check_texts
 from motionloom.requests.export import Export
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.reading import narrow_fields, read
@@ -52,6 +53,7 @@ _SEGMENT: Schema = {
     "type": "object",
     "properties": {name: schema(spec, _PARTS) for name, spec in specs(SegmentKeys).items()},
     "required": ["text"],
+    "additionalProperties": False,
 }
 _TIMELINE: Schema = {
     "type": "object",
@@ -62,6 +64,7 @@ _TIMELINE: Schema = {
         for name, spec in specs(TimelineKeys).items()
     },
     "required": ["segments"],
+    "additionalProperties": False,
 }
 KINDS: Mapping[str, Schema] = {"motion": {"type": "string"}, "goals": _GOALS, "timeline": _TIMELINE}
 """Fields that are read by their kind; no schema of a tool refers to another."""
@@ -77,6 +80,7 @@ class Assistant:
         """A function that generates motion by a task's request, with its fields as arguments."""
 
         async def call(**fields: Any) -> Any:
+            check_texts(fields, task)
             return await self._results({"task": task} | fields)
 
         known = narrow_fields(REQUESTS[task], most(task, self.worker.limits))
@@ -173,6 +177,24 @@ def _signature(known: Mapping[str, Spec], gives: Any) -> inspect.Signature:
     return inspect.Signature(arguments, return_annotation=gives)
 
 
+def strict(function: Callable[..., Any]) -> Any:
+    """The SDK's tool of a function; it refuses arguments that the function does not have, which the SDK leaves out."""
+    sdk = import_module("mcp.server.mcpserver.tools")
+    mistake = import_module("mcp.server.mcpserver.exceptions").ToolError
+
+    class Strict(sdk.Tool):
+        async def run(self, arguments: dict[str, Any], *others: Any, **more: Any) -> Any:
+            known = self.parameters["properties"]
+            if unknown := [name for name in arguments if name not in known]:
+                near = meant(unknown[0], known)
+                raise mistake(f"{self.name} has no {quoted(unknown[0])}{near}; it has {listed(tuple(known))}")
+            return await super().run(arguments, *others, **more)
+
+    tool = Strict.from_function(function)
+    tool.parameters["additionalProperties"] = False
+    return tool
+
+
 async def _or_refusal(call: Any) -> Any:
     """What a call gives; a refusal as the sentence that it is."""
     try:
@@ -184,16 +206,14 @@ async def _or_refusal(call: Any) -> Any:
 def run(folder: Path, *, weights: str = "default", device: str = "cpu", adapters: Sequence[Applied] = ()) -> None:
     """Serve the tools until standard input ends; raises MotionloomError where the extra is not installed."""
     try:
-        server = import_module("mcp.server.mcpserver").MCPServer(
-            "motionloom", instructions=WHAT, version=version("motionloom")
-        )
+        sdk = import_module("mcp.server.mcpserver")
     except ModuleNotFoundError as error:
         raise MotionloomError(f"MCP needs {error.name}: install it with pip install 'motionloom[mcp]'") from None
     limits = Limits()
     worker = Worker(Project(folder, limits), limits, weights=weights, device=device, adapters=adapters)
     tools = Assistant(worker.project, worker)
-    for tool in (*map(tools.tool, TASKS), tools.export):
-        server.tool()(tool)
+    made = [strict(tool) for tool in (*map(tools.tool, TASKS), tools.export)]
+    server = sdk.MCPServer("motionloom", instructions=WHAT, version=version("motionloom"), tools=made)
     for name, resource in (("actions", tools.actions), ("schemas/goal", tools.goal_schema)):
         server.resource(f"motionloom://{name}", mime_type="application/json")(resource)
     worker.start()

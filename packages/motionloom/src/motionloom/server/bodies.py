@@ -15,6 +15,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response, StreamingResponse
 
 from motionloom.io.text import shown
+from motionloom.reading import check_text
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
@@ -31,6 +32,11 @@ async def body_of(request: Request, most: int) -> bytes:
     return bytes(data)
 
 
+def session_of(request: Request) -> str:
+    """The session that a page names in X-Client; empty where there is none."""
+    return check_text(request.headers.get("x-client", "")[:64], "X-Client")
+
+
 @asynccontextmanager
 async def file_of(
     request: Request, project: Project, suffixes: Sequence[str], limits: Limits
@@ -40,7 +46,7 @@ async def file_of(
     Of the name only the ending, one of ``suffixes``, says where the file is. It is gone behind the block unless it was
     moved away.
     """
-    client_path = request.query_params.get("name", "")
+    client_path = check_text(request.query_params.get("name", ""), "the file's name")
     name = PurePosixPath(PureWindowsPath(client_path).name).name[:200]
     suffix = PurePosixPath(name).suffix.lower()
     if suffix not in suffixes:
@@ -54,7 +60,7 @@ async def file_of(
         with part.open("wb") as file:
             async for piece in _pieces(request, limits.upload_bytes, limits.body_seconds):
                 file.write(piece)
-        yield part, name if name.isprintable() else f"file{suffix}"
+        yield part, name
     finally:
         part.unlink(missing_ok=True)
 

@@ -49,7 +49,7 @@ def read_character(project: Project, part: Path, name: str, joints_json: str | N
 
 def named_joints(text: str | None) -> dict[str, str]:
     """The joints that somebody named, out of JSON; raises `MotionloomError` for what is no such mapping."""
-    names = {} if not text else parse_json(text.encode(), "the character's joints")
+    names = {} if not text else parse_json(text, "the character's joints")
     if not isinstance(names, dict) or not all(isinstance(one, str) for one in names.values()):
         raise MotionloomError('the character\'s \'joints\' are an object such as {"left_knee": "Shin_L"}')
     return names

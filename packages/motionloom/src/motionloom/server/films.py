@@ -100,7 +100,7 @@ def read(text: str, seconds: float) -> Film:
     from motionloom.viz.film import MAX_GIF_FRAMES, film_size
 
     keys = ("format", "width", "height", "fps", "count")
-    parts = Field(parse_json(text.encode(), "the film"), "the film").mapping(keys, keys)
+    parts = Field(parse_json(text, "the film"), "the film").mapping(keys, keys)
     kind = parts["format"].word(("mp4", "gif"))
     width, height, count = (_whole(parts[name]) for name in ("width", "height", "count"))
     fps = parts["fps"].number(1.0, MAX_FPS)

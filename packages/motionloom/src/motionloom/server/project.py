@@ -32,7 +32,7 @@ from motionloom.errors import MotionloomError
 from motionloom.formats import characters
 from motionloom.io.atomic import atomic_path
 from motionloom.io.npz import load_npz, save_npz
-from motionloom.io.text import parse_json
+from motionloom.io.text import stored_json
 from motionloom.motion import Motion
 from motionloom.server.limits import Limits
 from motionloom.server.refusal import Refusal
@@ -270,7 +270,7 @@ class Project:
 def _mapping(path: Path) -> dict[str, Any] | None:
     """The JSON object of a file, empty where it is damaged; None where there is no file."""
     try:
-        value = parse_json(path.read_bytes(), path.name)
+        value = stored_json(path.read_bytes(), path.name)
     except OSError:
         return None
     except MotionloomError:

@@ -19,11 +19,11 @@ from typing import Any
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
-from starlette.routing import BaseRoute, Route
+from starlette.routing import Route
 
 from motionloom.errors import MotionloomError
-from motionloom.io.text import parse_json
-from motionloom.server.bodies import body_of
+from motionloom.io.text import parse_json, stored_json
+from motionloom.server.bodies import body_of, session_of
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
 from motionloom.server.shelf import row
@@ -67,16 +67,19 @@ class Saved:
         self._known: tuple[object, Stamp | None] = (None, None)
 
     def read(self) -> bytes | None:
-        """What was saved last, or None; one without an id gets it. Raises `Refusal` 422 for what is no JSON."""
+        """What was saved last, or None; one without an id gets it, and what is no text in it is replaced.
+
+        Raises `Refusal` 422 for what is no JSON.
+        """
         with self._lock:
             data = self.project.read_project()
             if data is None or self.stamp() is None:
                 return data
-            value = json.loads(data)
+            value = _parsed(data)
             if isinstance(value, dict) and "segments" in value and "id" not in value:  # of before there were ids
                 self._write(value, Stamp(secrets.token_hex(8)))
                 return self.project.read_project()
-            return data
+            return data if data.isascii() and b"\\u" not in data else json.dumps(value).encode()
 
     def stamp(self) -> Stamp | None:
         """Of what was saved last; None where nothing was. Raises `Refusal` 422 for what is no JSON."""
@@ -186,7 +189,7 @@ class Saved:
 
 def _parsed(data: bytes) -> Any:
     try:
-        return parse_json(data, "project.json in the project folder")
+        return stored_json(data, "project.json in the project folder")
     except MotionloomError as error:
         raise Refusal(422, f"{error}; {ASIDE}") from None
 
@@ -227,7 +230,7 @@ def _sentence(there: Stamp, new: Stamp) -> str:
 # What is answered
 
 
-def routes() -> list[BaseRoute]:
+def routes() -> list[Route]:
     """The routes of the project's JSON."""
     return [
         Route("/project", saved_project, methods=["GET", "PUT"]),
@@ -244,7 +247,7 @@ async def saved_project(request: Request) -> Response:
         data = await run_in_threadpool(studio.saved.read)
         return Response(data or b"null", media_type="application/json", headers=NO_STORE)
     data = await body_of(request, studio.limits.project_bytes)
-    client, over = request.headers.get("x-client", "")[:64], request.query_params.get("over")
+    client, over = session_of(request), request.query_params.get("over")
     stamp = await run_in_threadpool(studio.saved.save, data, client, over)
     return JSONResponse({"saved": len(data), **stamp.public()})
 

@@ -63,12 +63,13 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     if token is not None and (len(token) < 8 or not token.isascii() or not token.isprintable()):
         raise MotionloomError("a token has at least 8 printable letters or digits; leave --token out to get one made")
     limits = limits or Limits()
+    robots = read_robots(options.robots)
+    bound = _bound(options.host, options.port)  # before anything is written: who is refused leaves no folder
     project = Project(options.project, limits)
     worker = Worker(project, limits, weights=options.weights, device=options.device, adapters=options.adapters)
     known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
-    live = _Live(worker, read_robots(options.robots))
+    live = _Live(worker, robots)
     app = build(project, worker, known, more=[WebSocketRoute("/live", live.answer)])
-    bound = _bound(options.host, options.port)
     host = f"[{options.host}]" if ":" in options.host else options.host
     address = f"http://{host}:{bound.getsockname()[1]}/" + (f"?token={token}" if token else "")
     print(f"motionloom: {address} (project: {project.folder})", file=sys.stderr, flush=True)

@@ -12,11 +12,13 @@ from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
-from motionloom.io.text import parse_json
+from motionloom.io.text import stored_json
 from motionloom.server.refusal import Refusal
 
 MOST = 500
 """Projects of one folder that are not open."""
+LONGEST = 1e6
+"""Seconds of one block; what is said to be longer is not counted."""
 WORDS = 3
 """Blocks whose words a list of projects shows."""
 
@@ -57,7 +59,7 @@ class Shelf:
         """What a list shows of each project, the one that was saved last first; what cannot be read is left out."""
         for place in sorted(self.folder.glob("*.json"), key=lambda place: -place.stat().st_mtime_ns):
             try:
-                project = parse_json(place.read_bytes(), place.name)
+                project = stored_json(place.read_bytes(), place.name)
             except (OSError, MotionloomError):
                 continue
             if isinstance(project, dict) and isinstance(project.get("id"), str) and self._place(project["id"]) == place:
@@ -80,7 +82,7 @@ def row(project: dict[str, Any], saved: float) -> dict[str, Any]:
         "saved": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(saved)),
         "words": [str(one.get("text", ""))[:120] for one in segments[:WORDS]],
         "blocks": len(segments),
-        "seconds": round(sum(one for one in seconds if isinstance(one, int | float)), 3),
+        "seconds": round(sum(one for one in seconds if isinstance(one, int | float) and 0 <= one < LONGEST), 3),
         "motion": motion if isinstance(motion, str) else None,
     }
 
