@@ -212,7 +212,7 @@ def _sloped_alike(theirs: Array, ours: Array) -> Array:
     theirs, ours: (frames, 5, 3) the lines of `_PELVIS`. The turn may put the pelvis of somebody who is straight at most
     `PELVIS` degrees off the trunk; of somebody who never is, no further off than it was.
     """
-    slope, bend = _slope(theirs), _angle(theirs[:, :2].sum(axis=1), -theirs[:, 3])
+    slope, bend = _slope(theirs), _angle(theirs[:, :2], -theirs[:, 3:4]).max(axis=1)
     straight = bend <= max(float(np.percentile(bend, 10)), 10.0)
     gap = np.median((_slope(ours) - slope + 180) % 360 - 180)
     if np.median(bend[straight]) < STRAIGHT:
