@@ -173,7 +173,6 @@ class Pool(NamedTuple):
         starts = np.where(repeats, np.maximum(first, rest - before), self._allowed(starts, first, end))
         return starts, self.lengths[chosen], self.texts.draw(rng, chosen)[0], self.climbs[chosen]
 
-
     def _allowed(self, starts: np.ndarray, first: np.ndarray, end: np.ndarray) -> np.ndarray:
         """The nearest frames within [first, end) at which windows may begin; where there are none, those of before."""
         before, behind = (frames[starts] for frames in self.allowed)

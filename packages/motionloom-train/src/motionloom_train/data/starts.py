@@ -13,7 +13,7 @@ SLOW, LIMBS = 0.4, 1.0
 STEADY, SWINGING = 0.25, 2.5
 """Share by which the pace of a steady gait changes within a second; metres per second of its hands at most."""
 AIR, LOW = 0.12, 0.6
-"""Metres of the lowest foot of somebody in the air; of the pelvis of somebody who lies or sits, whose feet may be up."""
+"""Metres of the lowest foot of somebody in the air; of the pelvis of somebody low, whose feet may be up."""
 _AHEAD, _AROUND = round(1.0 * FPS), 3
 _FEET, _HANDS = (7, 8, 10, 11), (20, 21)
 
