@@ -152,7 +152,7 @@ def test_the_name_of_a_recording_overrules_its_captions() -> None:
     assert action_of(captions) is None
     action = action_of(captions, "accad_Male2_E10_BodyHookRight")
     assert action is not None
-    assert action.name == "punch"
+    assert action.name == "hook"
     assert all("right" in text or "left" not in text for text in sentences(action, side="right"))
 
 

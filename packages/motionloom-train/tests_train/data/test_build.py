@@ -241,6 +241,36 @@ def test_manifests_that_lead_astray_are_refused(tmp_path: Path, row: tuple, reas
     assert not (tmp_path / "set").exists()
 
 
+@pytest.mark.parametrize("column", recordings.COLUMNS, ids=str)
+def test_a_row_with_an_empty_cell_is_left_out_by_name_and_the_build_goes_on(tmp_path: Path, column: str) -> None:
+    clips = {name: (recordings.walker(), "train", "walk") for name in ("first", "second")}
+    folder = recordings.write_pack(tmp_path / "pack", clips)
+    lines = (folder / "manifest.csv").read_text().splitlines()
+    cells = lines[1].split(",")
+    cells[recordings.COLUMNS.index(column)] = ""
+    (folder / "manifest.csv").write_text("\n".join([lines[0], ",".join(cells), lines[2]]))
+    said: list[str] = []
+    path = build([folder], tmp_path / "set", workers=1, mixed=0, progress=said.append)
+    dropped = json.loads(path.read_text())["dropped"]
+    if column == "description":
+        assert not dropped
+    else:
+        (reason,) = dropped.values()
+        assert f"manifest.csv has nothing under {column}" in reason
+        assert reason.startswith("line 2 of")
+        assert any(line.startswith("dropped ") and "line 2" in line for line in said)
+    assert "second" in by_name(tmp_path / "set")
+
+
+@pytest.mark.parametrize("unit", ["", 1.0])
+def test_places_of_joints_are_read_from_a_manifest(tmp_path: Path, unit: str | float) -> None:
+    walk = hml.uniform(recordings.walker())
+    np.savez(tmp_path / "walk.npz", positions=walk)
+    recordings.write_manifest(tmp_path, [("walk.npz", "mine", "walk", 20, 4, "train", "a person walks", unit)])
+    build([tmp_path], tmp_path / "set", workers=1, mixed=0, progress=lambda line: None)
+    np.testing.assert_allclose(by_name(tmp_path / "set")["walk"].positions()[:, 21], walk[:-1, 21], atol=0.03)
+
+
 def test_a_licence_is_never_made_up(tmp_path: Path) -> None:
     """Only sources called cmu or bandai get those licences; a manifest may state its own."""
     rows = [(f"{n}.bvh", n, n, 20, 1, "train", "", 1.0) for n in ("cmu-x", "bandai-1", "mine")]

@@ -53,17 +53,57 @@ def test_a_trunk_that_leans_is_told_by_its_angle(walk: np.ndarray, degrees: floa
 def test_a_folded_pelvis_is_told_though_all_else_is_straight(walk: np.ndarray) -> None:
     """The fault that a quarter of the recordings once had: hips in front of the pelvis instead of under it."""
     seen = compare(walk, tilted(walk, [0], -88.0))
-    assert seen.directions["pelvis"].median == pytest.approx(88, abs=0.1)
+    assert seen.directions["pelvis"].median > 55
     assert seen.directions["all"].high < 0.1
-    assert seen.faults() == ["pelvis 88.0 degrees off (95 %: 88)"]
+    (fault,) = seen.faults()
+    assert fault.startswith("pelvis")
 
 
-def test_a_trunk_stands_for_a_pelvis_that_lies_below_the_hips(walk: np.ndarray) -> None:
-    """As on many rigs for games; a sound copy passes and a folded one does not."""
-    odd = walk.copy()
-    odd[:, 0] = odd[:, [1, 2]].mean(axis=1) - [0.0, 0.05, 0.03]
-    assert compare(odd, walk).faults() == []
-    assert compare(odd, tilted(walk, [0], -88.0)).faults()
+def bending(walk: np.ndarray, place: tuple[float, float], follows: float = 0.4) -> np.ndarray:
+    """Somebody who walks and bends down by 80 degrees, the pelvis by a share of it.
+
+    place: metres up and ahead of the hips at which the joint called pelvis is on this rig, where nothing bends.
+    """
+    result = walk.copy()
+    result[:, 0] = walk[:, [1, 2]].mean(axis=1) + np.array([0.0, *place])
+    lean = 80 * np.sin(np.linspace(0, np.pi, len(walk))) ** 2
+    for frame, degrees in enumerate(lean):
+        one = slice(frame, frame + 1)
+        result[one] = tilted(tilted(result[one], SPINE_UP, degrees), [0], follows * degrees)
+    return result
+
+
+PLACES = {
+    "behind and above": (0.041, -0.034),
+    "ahead and above": (0.05, 0.03),
+    "high": (0.15, -0.01),
+    "behind": (0.0, -0.06),
+    "below": (-0.05, -0.03),
+    "far below": (-0.09, 0.0),
+}
+"""Of rigs on which everybody bends alike."""
+
+
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+def test_where_a_rig_has_its_pelvis_is_no_error(walk: np.ndarray, place: tuple[float, float]) -> None:
+    body = bending(walk, (0.09, -0.005))
+    seen = compare(bending(walk, place), body)
+    assert seen.directions["pelvis"].high < 0.1
+    assert seen.faults() == []
+
+
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+@pytest.mark.parametrize("fault", ["folded", "does not follow", "a side lower"])
+def test_a_pelvis_that_moves_otherwise_is_told_on_every_rig(
+    walk: np.ndarray, place: tuple[float, float], fault: str
+) -> None:
+    body = bending(walk, (0.09, -0.005), follows=1.8 if fault == "does not follow" else 0.4)
+    if fault == "folded":
+        body = tilted(body, [0], 88.0)
+    if fault == "a side lower":
+        body[:, 0] += [0.06, -0.02, 0.0]
+    faults = compare(bending(walk, place), body).faults()
+    assert any(text.startswith("pelvis") for text in faults)
 
 
 def test_an_arm_that_hangs_on_one_side_alone_is_a_fault(walk: np.ndarray) -> None:

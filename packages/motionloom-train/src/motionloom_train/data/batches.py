@@ -14,6 +14,7 @@ from motionloom.reading import read_table
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.clips import GESTURE, MEASURED
 from motionloom_train.data.sets import Item, MotionSet
+from motionloom_train.data.starts import nearest
 
 SHARE = {"action": 0.66, "human": 0.06, "index": 0.02, "label": 0.14, "measured": 0.12}
 """How often a training sample shows a named action, a written caption, an index description, a measured label, and
@@ -66,11 +67,13 @@ class Batches:
         self._heights = torch.zeros(len(data.mean), dtype=torch.bool)
         self._heights[HEIGHTS] = True
         self._heights = self._heights.to(place)
+        allowed = data.may_begin if data.may_begin is not None else np.ones(len(data.features), dtype=bool)
+        starts = nearest(allowed)
         self._fresh = fresh
         parts = {"": [item for item in data.items if not is_fresh(item, fresh_of)]}
         if fresh:
             parts["fresh "] = [item for item in data.items if is_fresh(item, fresh_of)]
-        self._pools = {w: [Pool.of(items, w, favour) for items in parts.values()] for w in self.windows}
+        self._pools = {w: [Pool.of(items, w, favour, starts) for items in parts.values()] for w in self.windows}
         for window, share in zip(self.windows, self.shares, strict=True):
             for part, pool in zip(parts, self._pools[window], strict=True):
                 if share > 0 and not len(pool.numbers):
@@ -140,23 +143,36 @@ class Pool(NamedTuple):
     texts: "Ragged"
     climbs: np.ndarray
     """(items,) bool: lowered to the floor."""
+    allowed: tuple[np.ndarray, np.ndarray]
+    """`nearest` frames of the set at which a window may begin."""
 
     @staticmethod
-    def of(items: Sequence[Item], window: int, favour: Mapping[str, float]) -> "Pool":
+    def of(
+        items: Sequence[Item], window: int, favour: Mapping[str, float], allowed: tuple[np.ndarray, np.ndarray]
+    ) -> "Pool":
         """The kind of text is sampled first (`SHARE`), then, but for captions and descriptions, the group, evenly but
-        for ``favour``, then the item by its weight: rare actions are seen as often as walks."""
+        for ``favour``, then the item by its weight: rare actions are seen as often as walks.
+
+        allowed: `nearest` frames at which windows may begin; an item that has none of them is sampled `ABRUPT` times
+        as often."""
         fitting: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(items):
             kind = _kind(item.group)
             if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
                 fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
+        weights = {
+            number: items[number].weight * _begins_well(items[number], window, allowed)
+            for groups in fitting.values()
+            for inside in groups.values()
+            for number in inside
+        }
         often: dict[int, float] = {}
         for kind, groups in fitting.items():
             kinds = SHARE[kind] / sum(SHARE[each] for each in fitting)
             favoured = {name: _favour(name, favour) for name in groups}
             for name, inside in groups.items():
-                share = kinds * favoured[name] / (sum(favoured.values()) * sum(items[n].weight for n in inside))
-                often |= {n: share * items[n].weight for n in inside}
+                share = kinds * favoured[name] / (sum(favoured.values()) * sum(weights[n] for n in inside))
+                often |= {n: share * weights[n] for n in inside}
         members = [items[number] for number in often]
         lengths = [min(item.frames, window) for item in members]
         spans = [_starts(item, length) for item, length in zip(members, lengths)]
@@ -168,6 +184,7 @@ class Pool(NamedTuple):
             Ragged.of([_rests(item, length) for item, length in zip(members, lengths)]),
             Ragged.of([item.texts for item in members]),
             np.array([item.group in CLIMBS for item in members], dtype=bool),
+            allowed,
         )
 
     def draw(self, rng: np.random.Generator, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -179,8 +196,15 @@ class Pool(NamedTuple):
         starts = first + (rng.random(rows) * (end - first)).astype(np.int64)
         before = rng.integers(2, 11, rows)
         rest, repeats = self.rests.draw(rng, chosen)
-        starts = np.where(repeats, np.maximum(first, rest - before), starts)
+        starts = np.where(repeats, np.maximum(first, rest - before), self._allowed(starts, first, end))
         return starts, self.lengths[chosen], self.texts.draw(rng, chosen)[0], self.climbs[chosen]
+
+    def _allowed(self, starts: np.ndarray, first: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """The nearest frames within [first, end) at which windows may begin; where there are none, those of before."""
+        before, behind = (frames[starts] for frames in self.allowed)
+        before, behind = np.where(before >= first, before, -1), np.where(behind < end, behind, -1)
+        nearer = np.where((behind < 0) | ((before >= 0) & (starts - before < behind - starts)), before, behind)
+        return np.where(nearer >= 0, nearer, starts)
 
 
 class Ragged(NamedTuple):
@@ -210,6 +234,12 @@ def _kind(group: str) -> str:
     return group if group in SHARE else named
 
 
+def _begins_well(item: Item, length: int, allowed: tuple[np.ndarray, np.ndarray]) -> float:
+    """1 for an item with a window of so many frames that may begin where it does, else `ABRUPT`."""
+    first, end = _starts(item, min(item.frames, length))
+    return 1.0 if allowed[1][first] < end else ABRUPT
+
+
 def _favour(name: str, favour: Mapping[str, float]) -> float:
     usual = 0.4 if "+" in name else GESTURE_SHARE if name.startswith(PREFIX + GESTURE) else 1.0
     return favour.get(name, usual)
@@ -219,6 +249,8 @@ CLIMBS = {"climb", "climb stairs", f"{PREFIX}climb ladder", f"{PREFIX}stairs"}
 """Groups of items that go up."""
 HEIGHTS = [LAYOUT["root_height"].start, *range(LAYOUT["ric"].start + 1, LAYOUT["ric"].stop, 3)]
 """Features that are heights over the floor."""
+ABRUPT = 0.3
+"""How often an item is sampled whose windows all begin in full motion, among those of its group."""
 BEFORE, ABOUT = 16, 2
 """Frames of a window before a change begins (people begin soon after a command), give or take so many."""
 

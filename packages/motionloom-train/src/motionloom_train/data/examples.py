@@ -22,6 +22,7 @@ from motionloom.motion import Motion
 from motionloom.reading import read_bytes
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.fidelity import compare
 from motionloom_train.data import augment
 from motionloom_train.data.person import uniform_person
 from motionloom_train.data.words import mirror_text
@@ -220,7 +221,11 @@ def check_clip(motion: Motion) -> list[Finding]:
     own = joints22(motion)
     findings = [*_of_size(leg, motion.seconds)]
     if not findings:
-        findings = [*_of_movement(uniform_positions(motion), own / max(leg, 1e-9) * 0.85, motion.fps), *_of_floor(own)]
+        uniform = uniform_positions(motion)
+        findings = [*_of_movement(uniform, own / max(leg, 1e-9) * 0.85, motion.fps), *_of_floor(own)]
+        if faults := compare(hml.resample_positions(own, motion.fps)[: len(uniform)], uniform).faults():
+            text = f"its body does not do what was recorded: {', '.join(faults[:4])}"
+            findings.append(Finding(text, fatal=False))
     return sorted(findings, key=lambda one: not one.fatal)
 
 

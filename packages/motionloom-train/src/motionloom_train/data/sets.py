@@ -21,6 +21,7 @@ from motionloom_train.data.actions import rests as rests_of
 from motionloom_train.data.clips import GESTURE, MANNER, MEASURED, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
 from motionloom_train.data.manners import MANNERS
+from motionloom_train.data.starts import may_begin
 from motionloom_train.data.words import EVENTS, STATES, phrases, sentence
 
 
@@ -108,6 +109,8 @@ class MotionSet:
     licences: tuple[str, ...]
     minutes: float
     """Minutes of motion as recorded, without mirrored and derived copies."""
+    may_begin: np.ndarray | None = None
+    """(frames of all clips,) bool: where a window may begin (`data.starts`); None: anywhere."""
 
 
 def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Sequence[str] = ("train",)) -> list[Clip]:
@@ -167,6 +170,7 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
         tuple(texts),
         tuple(sorted({c.licence for c in clips})),
         recorded,
+        np.concatenate([may_begin(c.features) for c in clips]),
     )
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from motionloom import formats
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
 from motionloom.io import load, text
@@ -115,9 +116,31 @@ def _pack(folder: Path) -> Iterator[Take]:
         raise _unusable(captions, error, "mend it") from None
     try:
         lines = io.StringIO(text.read_utf8(manifest, max_bytes=MAX_MANIFEST, empty=True), newline="")
-        yield from (_pack_take(folder, row, spans) for row in csv.DictReader(lines))
+        rows = csv.DictReader(lines)
+        for row in rows:
+            empty = [name for name in _needed(row) if not (row[name] or "x").strip()]
+            yield _unread(manifest, rows.line_num, row, empty) if empty else _pack_take(folder, row, spans)
     except DAMAGED as error:
         raise _unusable(manifest, error, "mend it") from None
+
+
+def _needed(row: dict[str, str]) -> tuple[str, ...]:
+    """The columns that a row must fill; formats that are in metres, and AMC files, need no unit."""
+    unit = () if _knows_its_unit(row["path"] or "") else ("metres_per_unit",)
+    return ("path", "source", "clip", "fps", "seconds", "split", *unit)
+
+
+def _knows_its_unit(path: str) -> bool:
+    return path.endswith(".amc") or formats.find(Path(path)).metres
+
+
+def _unread(manifest: Path, line: int, row: dict[str, str], empty: Sequence[str]) -> Take:
+    """The take of a row with empty cells, which cannot be read and says why."""
+
+    def read() -> Places:
+        raise MotionloomError(f"line {line} of {manifest} has nothing under {', '.join(empty)}; fill it in")
+
+    return Take(row["clip"].strip() or f"line_{line}", row["source"], UNKNOWN_LICENCE, "train", (), read)
 
 
 def _pack_take(folder: Path, row: dict[str, str], captions: dict[str, list[Span]]) -> Take:
@@ -128,7 +151,9 @@ def _pack_take(folder: Path, row: dict[str, str], captions: dict[str, list[Span]
     index = describe_index(row["description"])
     if index and (not spans or source.startswith(("cmu", "bandai"))):  # a whole sentence is no entry of an index
         spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
-    unit = None if path.suffix == ".amc" else float(row["metres_per_unit"])
+    unit = None if path.suffix == ".amc" else float(row["metres_per_unit"] or 1)
+    if unit == 1 and _knows_its_unit(row["path"]):
+        unit = None
     up = (row.get("up_axis") or "y").lower()
     if up not in AXES:
         raise ValueError(f"up_axis {up!r} of {row['clip']} is not one of {', '.join(AXES)}")

@@ -103,6 +103,9 @@ class OpenedGlb:
             return chosen[0] if chosen else None
         if str(clip) in clips:
             return clips.index(str(clip))
+        behind = [k for k, name in enumerate(clips) if name.rpartition("|")[2] == clip]  # "Armature|walk", of Blender
+        if len(behind) == 1:
+            return behind[0]
         number = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 9) else 0
         if not 1 <= number <= len(clips):
             listed = ", ".join(f"{k} {name!r}" for k, name in enumerate(clips[:20], start=1))

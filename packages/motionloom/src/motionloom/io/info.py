@@ -9,7 +9,8 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
-from motionloom.retarget.transfer import joints22
+from motionloom.retarget.fidelity import compare
+from motionloom.retarget.transfer import joints22, to_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.viz.figure import body_height, body_start
 
@@ -28,6 +29,8 @@ _FAMILIES = {
 """Some of the joints of each, by which it is known."""
 _ENOUGH = 20_000
 """Frames, from all over the motion, by which a body's build is measured."""
+_COPIED = 1200
+"""Frames, from the beginning, that are put on the 22-joint person and compared."""
 _BLOCK = 4096
 """Frames that are looked at together."""
 
@@ -137,7 +140,18 @@ def _problems(motion: Motion, spans: Array, way: Array, height: float, floor: fl
         problems.append(f"{name!r} turns by {np.degrees(turn[0]):.0f} degrees from frame {turn[1]} to {turn[1] + 1}")
     if motion.translations is not None and _stretch(motion) > 0.01:
         problems.append(f"bones change their length by up to {_stretch(motion):.2f} m")
+    if faults := _copy_faults(motion.frames(0, _COPIED)):
+        problems.append(f"on the 22-joint person its body does not do what was recorded: {', '.join(faults[:4])}")
     return problems
+
+
+def _copy_faults(motion: Motion) -> list[str]:
+    """What is wrong with the motion on the 22-joint person, if it is a person's."""
+    try:
+        person = to_smpl22(motion)
+    except MotionloomError:
+        return []
+    return compare(joints22(motion), person.positions()).faults()
 
 
 def _largest_turn(motion: Motion) -> tuple[float, int, int]:
