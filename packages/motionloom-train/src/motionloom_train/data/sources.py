@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom import formats
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
 from motionloom.io import load, text
@@ -131,7 +130,7 @@ def _needed(row: dict[str, str]) -> tuple[str, ...]:
 
 
 def _knows_its_unit(path: str) -> bool:
-    return path.endswith(".amc") or formats.find(Path(path)).metres
+    return path.endswith((".amc", ".npz"))
 
 
 def _unread(manifest: Path, line: int, row: dict[str, str], empty: Sequence[str]) -> Take:
