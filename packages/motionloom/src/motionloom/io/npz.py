@@ -22,7 +22,8 @@ Layout (version 1), for a motion of T frames and J joints:
 
 Those from ``translations`` on may be missing.
 
-An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints in metres and an ``fps`` is read too.
+An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints in metres and an ``fps`` is read too,
+and one with ``posed_joints`` and ``global_rot_mats`` (`soma`).
 """
 
 import io
@@ -124,7 +125,7 @@ def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
         if rate is None:
             raise MotionloomError(f"{path} has no 'fps'; give the frame rate")
         return _motion(file, rate)
-    return _from_positions(file, rate)
+    return _from_soma(file, rate) if "posed_joints" in file else _from_positions(file, rate)
 
 
 def read_arrays(
@@ -332,6 +333,17 @@ def _body(file: _Archive, names: tuple[str, ...]) -> _Body:
             raise file.bad("'pose_root' has no pose; leave it out")
         body["poses"] = Poses(*frames)
     return body
+
+
+def _from_soma(file: _Archive, fps: float | None) -> Motion:
+    from motionloom.io.soma import FPS, soma_motion
+
+    places = file.take("posed_joints", (None, None, 3)).astype(np.float64)
+    turns = file.take("global_rot_mats", (*places.shape[:2], 3, 3)).astype(np.float64)
+    try:
+        return soma_motion(places, turns, FPS if fps is None else fps)
+    except MotionloomError as error:
+        raise file.bad(error) from None
 
 
 def _from_positions(file: _Archive, fps: float | None) -> Motion:
