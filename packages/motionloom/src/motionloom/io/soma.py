@@ -1,7 +1,7 @@
 """NPZ files of the generator Kimodo: places and world rotations of the SOMA skeleton's joints, without their names.
 
-``posed_joints`` (T, J, 3) are metres, +Y up, and ``global_rot_mats`` (T, J, 3, 3) turn from the rest pose, a person in a
-T who faces +Z. J is 77, or 30 in older files; 22 are the joints of SMPL. The files state no rate: it is `FPS`.
+``posed_joints`` (T, J, 3) are metres, +Y up, and ``global_rot_mats`` (T, J, 3, 3) turn from the rest pose, a person in
+a T who faces +Z. J is 77, or 30 in older files; 22 are the joints of SMPL. The files state no rate: it is `FPS`.
 """
 
 import numpy as np
