@@ -38,6 +38,7 @@ class Action:
     limb: Literal["", "hand", "foot"] = ""
     turns: bool = False
     phase: bool = False
+    is_a: str = ""
 
     def named_by(self, texts: Sequence[str]) -> bool:
         """True where at least half of the captions name this action."""
@@ -154,6 +155,17 @@ def strike(positions: Array, fps: float, limb: str, *, side: str = "") -> tuple[
     at = int(speeds[:, one].argmax())
     around = max(0, at - round(0.5 * fps)), min(len(positions), at + round(0.3 * fps) + 1)
     return around, ("left", "right")[one] if peaks[1 - one] < 0.6 * peaks[one] else ""
+
+
+BRISK = {"hand": 6.0, "foot": 8.0}
+"""Metres per second of a hand or foot against the body in a brisk strike."""
+
+
+def briskness(positions: Array, fps: float, limb: str) -> float:
+    """The share of `BRISK` that a hand (``foot``: ankle) reaches; at most 1. ``positions`` (frames, 22, 3) metres."""
+    against = ph.in_body(positions)[:, _LIMBS[limb]]
+    fastest = np.linalg.norm(ph.velocity(against, fps), axis=-1).max()
+    return min(float(fastest) / BRISK[limb], 1.0)
 
 
 def rests(positions: Array, fps: float) -> list[int]:

@@ -4,7 +4,7 @@ import functools
 import re
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from motionloom.features.layout import FPS, LAYOUT
 from motionloom.io.atomic import finished
 from motionloom.io.text import parse_json, read_utf8
 from motionloom.reading import read_table
-from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
+from motionloom_train.data.actions import ACTIONS, PREFIX, briskness, sentences, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
 from motionloom_train.data.clips import GESTURE, MANNER, MEASURED, Clip, Note, read_clip
 from motionloom_train.data.made import GESTURES
@@ -70,6 +70,8 @@ WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 
 STRIKES = {"kick": "foot", "punch": "hand"}
 """How the measured labels begin that name a strike, and the limb that strikes."""
+LEAST_BRISK = 0.1
+"""How often the slowest strike is sampled, against a brisk one."""
 _MAX_SUMMARY = 64 << 20
 MOMENTS = 3
 """Windows shown for a caption that names an event."""
@@ -145,7 +147,7 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
     wordings: dict[str, tuple[int, ...]] = {}
     items, start = [], 0
     for clip in clips:
-        for note in clip.notes:
+        for note in (one for each in clip.notes for one in (each, *_general(each))):
             numbers = _worded(note, texts, wordings, rng)
             moments = _moments(clip, note)
             side = side_of([note.kind, *note.texts]) if "punch" in note.kind else ""
@@ -154,7 +156,7 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
                 core, rests = _when(clip, note.kind, core, first, last, side)
                 span = (start + core[0], start + core[1]) if core else None
                 begins = tuple(start + rest for rest in rests)
-                weight = WEIGHT.get(clip.kind, 1.0)
+                weight = WEIGHT.get(clip.kind, 1.0) * _striking(clip, note.kind, first, last)
                 items.append(
                     Item(start + first, last - first, note.kind, numbers, span, weight, begins, source=clip.source)
                 )
@@ -204,12 +206,33 @@ def _of_its_side(note: Note, texts: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(text for text in texts if side_of([text]) == "left") or texts
 
 
+def _general(note: Note) -> tuple[Note, ...]:
+    """The same stretch as the more general action that its action is, if it is one: a jab is a punch."""
+    action = ACTIONS.get(note.kind.removeprefix(PREFIX)) if note.kind.startswith(PREFIX) else None
+    if action is None or not action.is_a:
+        return ()
+    texts = sentences(ACTIONS[action.is_a], side=side_of(note.texts))
+    return (replace(note, kind=PREFIX + action.is_a, texts=texts),)
+
+
+def _limb(kind: str) -> str:
+    """The limb that strikes in what a note names, or nothing."""
+    action = ACTIONS.get(kind.removeprefix(PREFIX)) if kind.startswith(PREFIX) else None
+    return action.limb if action else next((limb for word, limb in STRIKES.items() if kind.startswith(word)), "")
+
+
+def _striking(clip: Clip, kind: str, first: int, last: int) -> float:
+    """How often a strike is sampled by its briskness: slow ones are many, and their average is slower still."""
+    limb = _limb(kind)
+    return max(briskness(clip.positions(first, last), FPS, limb) ** 2, LEAST_BRISK) if limb else 1.0
+
+
 def _when(
     clip: Clip, kind: str, core: tuple[int, int] | None, first: int, last: int, side: str
 ) -> tuple[tuple[int, int] | None, list[int]]:
     """The frames that a window must hold, narrowed to the strike where there is one; and where repetitions begin."""
     action = ACTIONS.get(kind.removeprefix(PREFIX)) if kind.startswith(PREFIX) else None
-    limb = action.limb if action else next((limb for word, limb in STRIKES.items() if kind.startswith(word)), "")
+    limb = _limb(kind)
     repeats = action is not None and action.kind == "repeats"
     if not limb and not repeats:
         return core, []

@@ -117,7 +117,7 @@ def _pack(folder: Path) -> Iterator[Take]:
         lines = io.StringIO(text.read_utf8(manifest, max_bytes=MAX_MANIFEST, empty=True), newline="")
         rows = csv.DictReader(lines)
         for row in rows:
-            empty = [name for name in _needed(row) if not (row[name] or "x").strip()]
+            empty = [name for name in _needed(row) if row[name] is not None and not row[name].strip()]
             yield _unread(manifest, rows.line_num, row, empty) if empty else _pack_take(folder, row, spans)
     except DAMAGED as error:
         raise _unusable(manifest, error, "mend it") from None

@@ -24,6 +24,7 @@ _FAMILIES = {
     "Mixamo": "mixamorig:Hips mixamorig:LeftUpLeg mixamorig:RightForeArm",
     "Unreal": "pelvis thigh_l calf_l upperarm_r lowerarm_r",
     "Rigify": "DEF-spine DEF-thigh.L DEF-shin.L DEF-forearm.R",
+    "SOMA (Kimodo)": "Hips Spine1 Chest Neck1 LeftLeg LeftShin RightForeArm",
     "MotionBuilder": "Hips LeftUpLeg LeftLeg LeftFoot RightForeArm",
 }
 """Some of the joints of each, by which it is known."""

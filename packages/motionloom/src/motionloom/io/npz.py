@@ -24,6 +24,7 @@ Those from ``translations`` on may be missing.
 
 An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints and an ``fps`` is read too. Such
 archives come in other units and with other axes up: what is surely not metres, or not +Y up, has to be told.
+One with ``posed_joints`` and ``global_rot_mats`` is read as well (`soma`).
 """
 
 import io
@@ -139,6 +140,9 @@ def load_npz(path: Path | str, *, fps: float | None = None, unit: float | None =
         if unit is not None:
             raise MotionloomError(f"{path} is in metres by its format; a unit is for positions without rotations")
         motion = _motion(file, rate)
+        return motion if up is None else set_upright(motion, path, up)
+    if "posed_joints" in file:
+        motion = _from_soma(file, rate)
         return motion if up is None else set_upright(motion, path, up)
     return _from_positions(file, rate, unit=unit, up=up)
 
@@ -356,6 +360,17 @@ def _body(file: _Archive, names: tuple[str, ...]) -> _Body:
             raise file.bad("'pose_root' has no pose; leave it out")
         body["poses"] = Poses(*frames)
     return body
+
+
+def _from_soma(file: _Archive, fps: float | None) -> Motion:
+    from motionloom.io.soma import FPS, soma_motion
+
+    places = file.take("posed_joints", (None, None, 3)).astype(np.float64)
+    turns = file.take("global_rot_mats", (*places.shape[:2], 3, 3)).astype(np.float64)
+    try:
+        return soma_motion(places, turns, FPS if fps is None else fps)
+    except MotionloomError as error:
+        raise file.bad(error) from None
 
 
 def _from_positions(file: _Archive, fps: float | None, *, unit: float | None, up: str | None) -> Motion:
