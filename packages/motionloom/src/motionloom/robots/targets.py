@@ -17,7 +17,7 @@ from motionloom.retarget.joint_map import Override
 from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
 from motionloom.robots.feet import plant
 from motionloom.robots.joints import SIDES
-from motionloom.skeleton import SMPL22
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -113,14 +113,22 @@ def rolled(targets: Targets, robot: Robot) -> Targets:
         low, high = robot.rolls[side]
         j, sole = targets.joints.index(f"{side}_ankle"), robot.soles[side]
         up = rot.rotate(rot.inverse(turns[:, j]), targets.place(f"{side}_hip") - places[:, j])
-        lean = np.arctan2(up[:, 1], up[:, 2])  # of the leg, seen from the foot: what the ankle has to roll
+        beside = _beside(robot.skeleton, side) / np.linalg.norm(up[:, 1:], axis=1)
+        lean = np.arctan2(up[:, 1], up[:, 2]) - np.arcsin(beside.clip(-1, 1))  # what the ankle has to roll
         upright = up[:, 2] / np.linalg.norm(up, axis=1)  # of a foot that swings behind, lean says nothing
-        over = (lean - lean.clip(low + _ROLL_LEFT, high - _ROLL_LEFT)) * ((upright - 0.5) / 0.25).clip(0, 1)
+        over = (lean - lean.clip(min(low + _ROLL_LEFT, 0.0), max(high - _ROLL_LEFT, 0.0))) * (
+            (upright - 0.5) / 0.25
+        ).clip(0, 1)
         turned = rot.multiply(turns[:, j], rot.rotvec_to_quat(-over[:, None] * np.array([1.0, 0.0, 0.0])))
         edge = np.where(over[:, None] < 0, sole[sole[:, 1].argmin()], sole[sole[:, 1].argmax()]) * [0.0, 1.0, 1.0]
         places[:, j] += rot.rotate(turns[:, j], edge) - rot.rotate(turned, edge)
         turns[:, j] = turned
     return replace(targets, places=places, turns=turns)
+
+
+def _beside(skeleton: Skeleton, side: str) -> float:
+    """Metres to the left of a leg's plane, in which knee and ankle bend, where the axes of the hip meet."""
+    return -float(sum(skeleton.offsets[skeleton.index(f"{side}_{part}")][0] for part in ("knee", "ankle")))
 
 
 def lowered(targets: Targets, down: Array) -> Targets:

@@ -1,0 +1,135 @@
+"""Models are compiled first by a process of their own: one that hangs, eats memory or crashes MuJoCo ends that alone.
+
+The process lives on for the next model, and ends with the one that began it.
+"""
+
+import atexit
+import json
+import os
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+from motionloom.errors import MotionloomError
+from motionloom.robots.engine import load_mujoco
+
+SECONDS, PROCESSOR_SECONDS = 60.0, 10
+"""For one model, by the clock and of one core; those of real robots take less than two of a core."""
+MEMORY = 3 << 30
+"""Bytes of address space of the process, of which MuJoCo itself takes 0.5 GB."""
+_LOCK = threading.Lock()
+
+
+class _Process:
+    """One that tries models, and the process that began it."""
+
+    def __init__(self) -> None:
+        self.parent = os.getpid()
+        search = os.pathsep.join(entry for entry in sys.path if entry)
+        self.popen = subprocess.Popen(
+            [sys.executable, "-P", "-m", "motionloom.robots.trial"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": search, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            start_new_session=True,  # Ctrl-C is for the one who waits, who then ends it
+        )
+
+    def ask(self, path: Path, *, meshes: bool) -> dict[str, str | None] | None:
+        """What it says of a model; None where it ended over it."""
+        assert self.popen.stdin is not None and self.popen.stdout is not None
+        clock = threading.Timer(SECONDS, self.popen.kill)
+        clock.start()
+        try:
+            with suppress(OSError):
+                self.popen.stdin.write(json.dumps([str(path), meshes]).encode() + b"\n")
+                self.popen.stdin.flush()
+            line = self.popen.stdout.readline()
+        finally:
+            clock.cancel()
+        return json.loads(line) if line.endswith(b"\n") else None
+
+    def end(self) -> None:
+        if self.parent != os.getpid():  # it is another's, of which this process is a copy
+            return
+        self.popen.kill()
+        self.popen.wait()
+        for stream in (self.popen.stdin, self.popen.stdout):
+            with suppress(OSError):
+                stream.close()  # type: ignore[union-attr]
+
+
+_PROCESS: list[_Process] = []
+
+
+def try_model(path: Path, *, meshes: bool) -> None:
+    """Let a model be compiled by another process, within `SECONDS`, `PROCESSOR_SECONDS` and `MEMORY`.
+
+    Raises `MotionloomError` for one that cannot be compiled, or not within these.
+    """
+    with _LOCK:
+        if _PROCESS and _PROCESS[0].parent != os.getpid():
+            _PROCESS.clear()
+        if not _PROCESS:
+            _PROCESS.append(_Process())
+        said = None
+        try:
+            said = _PROCESS[0].ask(path.absolute(), meshes=meshes)
+        finally:
+            if said is None:
+                _end()
+    if said is None:
+        raise MotionloomError(
+            f"{path} cannot be read as a robot's model within {PROCESSOR_SECONDS} s of one core and {MEMORY >> 30} GB of memory; give a "
+            "model of one robot, without things that are repeated many times, large grids or large textures"
+        )
+    if said["error"] is not None:
+        raise MotionloomError(said["error"].replace(str(path.absolute()), str(path)))
+
+
+def _end() -> None:
+    while _PROCESS:
+        _PROCESS.pop().end()
+
+
+atexit.register(_end)
+
+
+def _serve() -> None:
+    """Answer one line for each line of standard input."""
+    from motionloom.robots.model import compiled
+
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what MuJoCo prints is no answer
+    with suppress(ImportError):  # Windows has no such limits
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    for line in sys.stdin:
+        path, meshes = json.loads(line)
+        _limit_time()
+        error = None
+        try:
+            load_mujoco().MjData(compiled(Path(path), meshes=meshes)[1])
+        except MotionloomError as refusal:
+            if "unknown exception" in str(refusal) or "allocate" in str(refusal):  # MuJoCo's words for no memory left
+                os._exit(1)
+            error = str(refusal)
+        except MemoryError:
+            os._exit(1)
+        print(json.dumps({"error": error}), file=answers, flush=True)
+
+
+def _limit_time() -> None:
+    """Let the system end this process should nobody be there who does."""
+    with suppress(ImportError):
+        import resource
+
+        spent = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+        resource.setrlimit(resource.RLIMIT_CPU, (int(spent) + PROCESSOR_SECONDS, resource.RLIM_INFINITY))
+
+
+if __name__ == "__main__":
+    _serve()
