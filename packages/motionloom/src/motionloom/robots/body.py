@@ -53,8 +53,8 @@ class Robot:
     """Side to the radians, left side up, that a foot rolls from where it is level at rest; 0 and 0 without such a
     hinge: that foot rolls with its leg."""
     turns: dict[str, Array]
-    """Side to the shares (3,), of roll, pitch and yaw in the frame of the ankle's site, in which the leg's hinges turn a
-    foot that stays in its place: about 0 where a hinge is missing."""
+    """Side to the shares (3,), of roll, pitch and yaw in the frame of the ankle's site, in which the leg's hinges turn
+    a foot that stays in its place: about 0 where a hinge is missing."""
     notes: tuple[str, ...]
     map: Path | None = None
     """Which joint is which, as a user said."""

@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -36,15 +37,24 @@ class _Process:
             env={**os.environ, "PYTHONPATH": search, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             start_new_session=True,  # Ctrl-C is for the one who waits, who then ends it
         )
+        self.works: bool | None = None
+
+    def is_ready(self) -> bool:
+        """Whether it works at all: where no other process can be, models are read without."""
+        if self.works is None:
+            assert self.popen.stdout is not None
+            self.works = self.popen.stdout.readline() == b"ready\n"
+        return self.works
 
     def ask(self, path: Path, *, meshes: bool) -> dict[str, str | None] | None:
         """What it says of a model; None where it ended over it."""
-        assert self.popen.stdin is not None and self.popen.stdout is not None
+        assert self.popen.stdin is not None
+        assert self.popen.stdout is not None
         clock = threading.Timer(SECONDS, self.popen.kill)
         clock.start()
         try:
             with suppress(OSError):
-                self.popen.stdin.write(json.dumps([str(path), meshes]).encode() + b"\n")
+                self.popen.stdin.write(json.dumps([str(path), meshes, PROCESSOR_SECONDS]).encode() + b"\n")
                 self.popen.stdin.flush()
             line = self.popen.stdout.readline()
         finally:
@@ -76,25 +86,26 @@ def try_model(path: Path, *, meshes: bool) -> None:
             _PROCESS.append(_Process())
         said = None
         try:
-            said = _PROCESS[0].ask(path.absolute(), meshes=meshes)
+            said = _PROCESS[0].ask(path.absolute(), meshes=meshes) if _PROCESS[0].is_ready() else {"error": None}
         finally:
             if said is None:
-                _end()
+                end()
     if said is None:
         raise MotionloomError(
-            f"{path} cannot be read as a robot's model within {PROCESSOR_SECONDS} s of one core and {MEMORY >> 30} GB of memory; give a "
-            "model of one robot, without things that are repeated many times, large grids or large textures"
+            f"{path} cannot be read as a robot's model within {PROCESSOR_SECONDS} s of one core and {MEMORY >> 30} GB "
+            "of memory; give a model of one robot, without large numbers of repeated things, large grids or textures"
         )
     if said["error"] is not None:
         raise MotionloomError(said["error"].replace(str(path.absolute()), str(path)))
 
 
-def _end() -> None:
+def end() -> None:
+    """End the process, if there is one; the next model gets another."""
     while _PROCESS:
         _PROCESS.pop().end()
 
 
-atexit.register(_end)
+atexit.register(end)
 
 
 def _serve() -> None:
@@ -103,13 +114,12 @@ def _serve() -> None:
 
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what MuJoCo prints is no answer
-    with suppress(ImportError):  # Windows has no such limits
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    _limit("RLIMIT_AS", MEMORY)
+    load_mujoco()
+    print("ready", file=answers, flush=True)
     for line in sys.stdin:
-        path, meshes = json.loads(line)
-        _limit_time()
+        path, meshes, seconds = json.loads(line)
+        _limit("RLIMIT_CPU", int(time.process_time()) + seconds)
         error = None
         try:
             load_mujoco().MjData(compiled(Path(path), meshes=meshes)[1])
@@ -122,13 +132,13 @@ def _serve() -> None:
         print(json.dumps({"error": error}), file=answers, flush=True)
 
 
-def _limit_time() -> None:
-    """Let the system end this process should nobody be there who does."""
-    with suppress(ImportError):
+def _limit(name: str, most: int) -> None:
+    """Let the system hold this process to a limit; Windows has none."""
+    with suppress(ImportError, OSError, ValueError):
         import resource
 
-        spent = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-        resource.setrlimit(resource.RLIMIT_CPU, (int(spent) + PROCESSOR_SECONDS, resource.RLIM_INFINITY))
+        hard = resource.getrlimit(getattr(resource, name))[1]
+        resource.setrlimit(getattr(resource, name), (most if hard < 0 else min(most, hard), hard))
 
 
 if __name__ == "__main__":
