@@ -44,7 +44,7 @@ class _Process:
         if self.works is None:
             assert self.popen.stdout is not None
             self.works = self.popen.stdout.readline() == b"ready\n"
-        return self.works
+        return bool(self.works)
 
     def ask(self, path: Path, *, meshes: bool) -> dict[str, str | None] | None:
         """What it says of a model; None where it ended over it."""
