@@ -35,7 +35,7 @@ BUDGETS = {
     "retarget": 3_002,
     "live": 2_919,
     "blender/(top)": 2_786,
-    "robots": 2_657,
+    "robots": 3_163,
     "kinematics": 2_644,
     "viz": 2_287,
     "edits": 2_117,

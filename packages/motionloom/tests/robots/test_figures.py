@@ -154,6 +154,36 @@ def test_joints_and_the_root_are_counted_as_they_are(robot: Robot, clip: Clip) -
     assert measure(replace(still, qpos=qpos), robot).speed_share is None  # MJCF states no speeds
 
 
+def test_a_pelvis_that_shakes_and_turns_away_is_told(robot: Robot) -> None:
+    """A clip whose root trembles by 1 cm, one turned by 30 degrees, and one tilted by 25: each has its sentence."""
+    made = put_on_robot(marching(), robot)
+    assert not any("pelvis" in fault for fault in measure(made, robot).faults())
+
+    def faults(change: np.ndarray, *, known: bool = True) -> str:
+        qpos = made.qpos.copy()
+        qpos[:, :3] += change[:, :3]
+        qpos[:, 3:7] = rot.multiply(rot.rotvec_to_quat(change[:, 3:]), qpos[:, 3:7])
+        return " and ".join(
+            fault
+            for fault in measure(replace(made, qpos=qpos, aims=made.aims if known else None), robot).faults()
+            if "pelvis" in fault
+        )
+
+    still = np.zeros((len(made), 6))
+    trembling = still + 0.01 * (-1.0) ** np.arange(len(made))[:, None] * np.eye(6)[0]
+    acceleration = 0.04 * 50**2
+    assert f"the pelvis shakes: its acceleration is {acceleration:.1f} m/s2, where the motion has 0." in faults(
+        trembling
+    )
+    assert faults(trembling, known=False) == f"the pelvis shakes: its acceleration is {acceleration:.1f} m/s2"
+    assert (
+        faults(still + np.radians(30) * np.eye(6)[5])
+        == "the pelvis faces up to 30 degrees away from the person's heading"
+    )
+    assert "the pelvis leans up to 2" in faults(still + np.radians(25) * np.eye(6)[3])
+    assert faults(still + np.radians(15) * np.eye(6)[5]) == ""
+
+
 def test_what_is_checked_is_the_part_that_is_asked(
     robot: Robot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

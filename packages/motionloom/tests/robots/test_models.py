@@ -1,8 +1,10 @@
 """Which robots are read, which joint is found to be which, and one sentence about everything else."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +12,12 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from tests.robots import models
+from tests.robots.people import marching
 from tests.shared import shared
 
 pytest.importorskip("mujoco")
 
+from motionloom.robots import trial
 from motionloom.robots.body import Robot, read_robot
 
 
@@ -68,6 +72,8 @@ def test_joints_are_found_by_names_and_by_shape(names: str, tmp_path: Path) -> N
         ("J18_ELBOW_YAW_L", "left_elbow"),
         ("J23_HEAD_YAW", "neck"),
         ("r_leg_akx", "right_ankle"),
+        ("left_ank_pitch", "left_ankle"),
+        ("right_sho_roll", "right_shoulder"),
         ("l_arm_wry", "left_wrist"),
         ("neck_ry", "neck"),
         ("abdomen_z", "waist"),
@@ -264,3 +270,119 @@ def test_without_the_extra_one_sentence_names_it(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", WITHOUT, *line], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "motionloom[robots]" in done.stderr
+
+
+def knees(robot: Robot) -> list[float]:
+    return [float(robot.home[7 + robot.file.joint_names().index(f"{side}_knee_joint")]) for side in ("left", "right")]
+
+
+@pytest.mark.parametrize(
+    ("angles", "expected"),
+    [((0.0, 0.0), (0.25, 0.25)), ((0.1, 0.6), (0.35, 0.6)), ((0.6, 0.7), (0.6, 0.7)), ((0.3, 0.3), (0.3, 0.3))],
+)
+@pytest.mark.parametrize("name", ["home", "stand"])
+def test_a_straight_leg_of_a_keyframe_is_bent(
+    name: str, angles: tuple[float, float], expected: tuple[float, float], tmp_path: Path
+) -> None:
+    """Each leg that is straight in it, and no other: a knee at the end of its range locks."""
+    qpos = np.zeros(7 + 21)
+    qpos[2:4] = 0.7, 1.0
+    qpos[[7 + 3, 7 + 9]] = angles
+    key = f'<keyframe><key name="{name}" qpos="{" ".join(map(str, qpos))}"/></keyframe></mujoco>'
+    robot = read(tmp_path, models.humanoid().replace("</mujoco>", key))
+    assert knees(robot) == pytest.approx(expected, abs=1e-9)
+
+
+def test_knees_do_not_lock_where_the_hips_stand_out(tmp_path: Path) -> None:
+    """The leg's plane is 10 cm beside the place where the axes of the hip meet, as on an H1."""
+    pytest.importorskip("mink")
+    from motionloom.robots.clip import put_on_robot
+
+    text = models.humanoid(models.H1)
+    for side, y in (("left", 0.1), ("right", -0.1)):
+        text = text.replace(f'<body name="{side}_thigh_c">', f'<body name="{side}_thigh_c" pos="0 {y} 0">')
+        text = text.replace(f'name="{side}_hip_yaw_joint" axis="0 1 0"', f'name="{side}_hip_yaw_joint" axis="0 0 1"')
+        text = text.replace(
+            f'name="{side}_hip_pitch_joint" axis="0 0 1"', f'name="{side}_hip_pitch_joint" axis="0 1 0"'
+        )
+    robot = read(tmp_path, text)
+    clip = put_on_robot(marching(), robot)
+    bent = [clip.qpos[:, 7 + robot.file.joint_names().index(f"{side}_knee_joint")] for side in ("left", "right")]
+    assert np.min(bent) > 0.1
+    assert clip.errors is not None
+    assert np.median(clip.errors) < 0.01
+
+
+COUPLED = """<equality><joint joint1="right_elbow_joint" joint2="left_elbow_joint" polycoef="0 1 0 0 0"/>
+<joint joint1="left_ankle_pitch_joint" joint2="left_knee_joint" polycoef="0 -0.5 0 0 0"/>
+<joint joint1="left_shoulder_yaw_joint" joint2="left_shoulder_roll_joint" polycoef="0.1 0 0.3 0 0"/>
+<joint joint1="waist_yaw_joint" polycoef="0.1 0 0 0 0"/>
+<connect body1="chest" body2="left_palm" anchor="0 0 0"/></equality></mujoco>"""
+
+
+def test_hinges_that_others_move_follow_them(tmp_path: Path) -> None:
+    """In all frames and at rest: gears, a polynomial, a hinge that is held; a closed chain is told."""
+    pytest.importorskip("mink")
+    from motionloom.robots.clip import put_on_robot
+
+    robot = read(tmp_path, models.humanoid().replace("</mujoco>", COUPLED))
+    assert any("1 constraints that close chains" in note for note in robot.notes)
+    clip = put_on_robot(marching(), robot)
+    poses = dict(zip(robot.file.joint_names(), np.vstack([clip.qpos, robot.home])[:, 7:].T))
+    assert np.ptp(poses["left_knee_joint"]) > 0.5
+    np.testing.assert_allclose(poses["right_elbow_joint"], poses["left_elbow_joint"], atol=1e-9)
+    np.testing.assert_allclose(poses["left_ankle_pitch_joint"], -0.5 * poses["left_knee_joint"], atol=1e-9)
+    expected = 0.1 + 0.3 * poses["left_shoulder_roll_joint"] ** 2
+    np.testing.assert_allclose(poses["left_shoulder_yaw_joint"], expected, atol=1e-9)
+    np.testing.assert_allclose(poses["waist_yaw_joint"], 0.1, atol=1e-9)
+    assert clip.errors is not None
+    assert np.median(clip.errors) < 0.02
+
+
+BOMBS = {
+    "bodies": "<replicate count='100000000' offset='0 0 1'><geom size='1'/></replicate>",
+    "nested": "<replicate count='9999'><replicate count='9999'><geom size='1'/></replicate></replicate>",
+    "soft": "<flexcomp name='f' type='grid' count='1000 1000 1000' spacing='.1 .1 .1' radius='.01' dim='3'/>",
+}
+
+
+@pytest.mark.parametrize("bomb", BOMBS)
+def test_a_model_that_never_ends_is_refused(bomb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a sentence; and the next model is read as ever."""
+    monkeypatch.setattr(trial, "PROCESSOR_SECONDS", 1)
+    trial.end()
+    text = models.humanoid().replace("<worldbody>", f"<worldbody>{BOMBS[bomb]}")
+    with pytest.raises(MotionloomError, match=r"cannot be read as a robot's model within 1 s of one core and 3 GB"):
+        read(tmp_path, text)
+    monkeypatch.undo()
+    assert read(tmp_path, models.humanoid()).name == "tin"
+
+
+@pytest.mark.parametrize(
+    ("things", "words"),
+    [
+        ("<replicate count='3500' offset='0 0 1'><geom size='.1'/></replicate>", "3,524 bodies, geoms"),
+        ("<replicate count='3500' offset='0 0 1'><site size='.1'/></replicate>", "3,500 bodies, geoms"),
+    ],
+)
+def test_a_model_of_too_many_things_is_refused(things: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(MotionloomError, match=words):
+        read(tmp_path, models.humanoid().replace("<worldbody>", f"<worldbody>{things}"))
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="children are looked for in /proc")
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_command_whose_model_never_ends(ending: signal.Signals, tmp_path: Path) -> None:
+    """And the process that reads the model with it."""
+    path = written(tmp_path, models.humanoid().replace("<worldbody>", f"<worldbody>{BOMBS['bodies']}"))
+    line = [sys.executable, "-m", "motionloom", "robot-check", str(path), "--robot", str(path)]
+    with subprocess.Popen(line, stderr=subprocess.PIPE) as command:
+        children: list[int] = []
+        while command.poll() is None and not children:
+            children = [
+                int(one) for one in Path(f"/proc/{command.pid}/task/{command.pid}/children").read_text().split()
+            ]
+            time.sleep(0.02)
+        command.send_signal(ending)
+        assert command.wait(timeout=60) == 130
+        assert not any(Path(f"/proc/{child}").exists() for child in children)

@@ -26,6 +26,10 @@ LEGS_M = (0.08, 1.6)
 """Metres of thigh and shin of a robot; outside of it a model is in another unit."""
 _BENT = 0.25
 """Radians by which knees are bent in the pose that a robot prefers, where its file has none of its own."""
+_STRAIGHT = 0.995
+"""Share of its greatest length from which on a leg counts as straight: at 0.2 rad in the knee."""
+_REACHES = 0.05
+"""Share of the largest: singular values of a leg's Jacobian below it count as none."""
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 _KEYS = ("home", "stand", "standing", "default")
 
@@ -41,13 +45,16 @@ class Robot:
     skeleton: Skeleton
     """+Y up, facing +Z, standing on y = 0: names are those of the uniform person's joints."""
     home: Array
-    """(nq,) the pose that the robot prefers: it stands, knees slightly bent."""
+    """(nq,) the pose that the robot prefers: it stands, knees bent, a little at least."""
     soles: dict[str, Array]
     """Side to (corners, 3) metres in the frame of the ankle's site, +Z up: heels first, then toes, at rest on one
     plane."""
     rolls: dict[str, tuple[float, float]]
-    """Side to the radians, left side up, that a foot rolls from where it is level at rest; infinite without such a
-    hinge."""
+    """Side to the radians, left side up, that a foot rolls from where it is level at rest; 0 and 0 without such a
+    hinge: that foot rolls with its leg."""
+    turns: dict[str, Array]
+    """Side to the shares (3,), of roll, pitch and yaw in the frame of the ankle's site, in which the leg's hinges turn
+    a foot that stays in its place: about 0 where a hinge is missing."""
     notes: tuple[str, ...]
     map: Path | None = None
     """Which joint is which, as a user said."""
@@ -140,8 +147,9 @@ class _Reading:
         soles = {side: soles[side] - places[f"{side}_ankle"] for side in SIDES}
         model, skeleton = self._with_sites(places, bodies), _skeleton(places, soles)
         notes = (*self.file.notes, *notes)
-        home, rolls = self._home(), self._rolls()
-        return Robot(self.file, self.parts, model, skeleton, home, soles, rolls, notes)
+        home = self._home()
+        turns = {side: self._turns(model, home, side) for side in SIDES}
+        return Robot(self.file, self.parts, model, skeleton, home, soles, self._rolls(), turns, notes)
 
     def _pose(self) -> None:
         mujoco = load_mujoco()
@@ -282,7 +290,7 @@ class _Reading:
         return np.concatenate(points) if points else np.zeros((0, 3))
 
     def _rolls(self) -> dict[str, tuple[float, float]]:
-        rolls: dict[str, tuple[float, float]] = dict.fromkeys(SIDES, (-np.inf, np.inf))
+        rolls: dict[str, tuple[float, float]] = dict.fromkeys(SIDES, (0.0, 0.0))
         for side in SIDES:
             for hinge in self.parts.hinges[f"{side}_ankle"]:
                 ahead = float(self.data.xaxis[hinge.joint][0])
@@ -290,8 +298,27 @@ class _Reading:
                 if abs(ahead) > 0.7:
                     limits = np.array([self.file.lower[row], self.file.upper[row]])
                     ends = np.sign(ahead) * (limits - self.qpos[7 + row])
-                    rolls[side] = (float(ends.min()), float(ends.max()))
+                    rolls[side] = (min(float(ends.min()), 0.0), max(float(ends.max()), 0.0))
         return rolls
+
+    def _turns(self, model: Any, home: Array, side: str) -> Array:
+        """(3,) how far a foot is turned about its axes by hinges that leave it in its place."""
+        mujoco = load_mujoco()
+
+        data, jacobian = posed(model, home), np.empty((6, model.nv))
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], model.site(f"motionloom {side}_ankle").id)
+        for one in self.file.couplings:
+            follower = jacobian[:, 6 + one.hinge].copy()
+            jacobian[:, 6 + one.hinge] = 0
+            jacobian[:, 6 + one.leader] += one.slope(home[7:]) * follower
+        leg = [int(model.jnt_dofadr[h.joint]) for part in LEG for h in self.parts.hinges[f"{side}_{part}"]]
+        place, turn = jacobian[:3, leg], jacobian[3:, leg]
+        _, sizes, ways = np.linalg.svd(place)
+        free = ways[int((sizes > _REACHES * sizes[0]).sum()) :].T
+        axes, sizes, _ = np.linalg.svd(turn @ free, full_matrices=False)
+        about = data.site(f"motionloom {side}_ankle").xmat.reshape(3, 3).T @ axes[:, sizes > _REACHES]
+        return (about**2).sum(axis=1)
 
     def _check_size(self, places: dict[str, Array]) -> None:
         leg = sum(
@@ -314,24 +341,34 @@ class _Reading:
         return self.file.spec.compile()
 
     def _home(self) -> Array:
-        """The file's own standing pose, else this one with knees bent a little."""
-        model = self.file.model
-        for key in range(model.nkey):
-            if model.key(key).name.lower() in _KEYS:
-                home = np.array(model.key_qpos[key])
-                home[3:7] = self.qpos[3:7]
-                home[7:] = np.clip(home[7:], self.file.lower, self.file.upper)
-                return home
-        home = self.qpos.copy()
+        """The file's standing pose, else this one, with legs that are straight in it bent a little."""
+        model, home = self.file.model, self.qpos.copy()
         home[7:] = model.qpos0[7:]
+        keys = [key for key in range(model.nkey) if model.key(key).name.lower() in _KEYS]
+        if keys:
+            home[7:] = np.clip(model.key_qpos[keys[0]][7:], self.file.lower, self.file.upper)
+            home[:3] = model.key_qpos[keys[0]][:3]
         for side in SIDES:
+            if keys and not self._is_straight(home, side):
+                continue
             for part, share in (("hip", -0.5), ("knee", 1.0), ("ankle", -0.5)):
                 hinge = max(self.parts.hinges[f"{side}_{part}"], key=lambda h: abs(float(self.data.xaxis[h.joint][1])))
                 row = self.file.hinges.index(hinge)
                 sign = float(np.sign(self.data.xaxis[hinge.joint][1])) or 1.0
                 home[7 + row] += sign * share * _BENT
-        home[7:] = np.clip(home[7:], self.file.lower, self.file.upper)
+        home[7:] = self.file.coupled(np.clip(home[7:], self.file.lower, self.file.upper))
         return home
+
+    def _is_straight(self, home: Array, side: str) -> bool:
+        """Whether hip and ankle are nearly as far apart in a pose as the knee lets them be."""
+        joints = [self.parts.hinges[f"{side}_{part}"][-1].joint for part in LEG]
+        knee, pose = self.file.hinges.index(self.parts.hinges[f"{side}_knee"][-1]), home.copy()
+        apart = []
+        for angle in [home[7 + knee], *np.linspace(self.file.lower[knee], self.file.upper[knee], 91)]:
+            pose[7 + knee] = angle
+            anchors = posed(self.file.model, pose).xanchor[joints]
+            apart.append(float(np.linalg.norm(anchors[2] - anchors[0])))
+        return apart[0] > _STRAIGHT * max(apart)
 
 
 def _skeleton(places: dict[str, Array], soles: dict[str, Array]) -> Skeleton:

@@ -35,6 +35,8 @@ class Clip:
     """(frames, 2, 2) whether heel and toes of the left and right foot are on the ground."""
     errors: Array | None = None
     """(frames, 4) metres from where `EFFECTORS` were to be; None where nobody knows."""
+    aims: Array | None = None
+    """(frames, 7) metres and quaternion (w, x, y, z) of where the pelvis's site was to be; None where nobody knows."""
     slowed: float = 0.0
     """Seconds that it is longer than its motion, so that hinges keep their speeds."""
 
@@ -45,7 +47,8 @@ class Clip:
         """Frames ``start`` to ``stop`` (half-open)."""
         some = slice(start, stop)
         errors = None if self.errors is None else self.errors[some]
-        return replace(self, qpos=self.qpos[some], planted=self.planted[some], errors=errors)
+        aims = None if self.aims is None else self.aims[some]
+        return replace(self, qpos=self.qpos[some], planted=self.planted[some], errors=errors, aims=aims)
 
 
 def put_on_robot(
@@ -78,7 +81,8 @@ def put_on_robot(
     poses, reached = solve(robot, targets, avoid=avoid_collisions, watched=EFFECTORS, progress=progress)
     rows = [targets.joints.index(joint) for joint in EFFECTORS]
     errors = np.linalg.norm(reached - targets.places[:, rows], axis=-1)
-    clip = Clip(fps, poses, targets.planted, errors)
+    aims = np.concatenate([targets.place("pelvis"), targets.turn("pelvis")], axis=1)
+    clip = Clip(fps, poses, targets.planted, errors, aims)
     return _paced(clip, robot.file.speeds(max_speed))
 
 
@@ -109,12 +113,21 @@ def sampled(clip: Clip, at: Array, fps: float | None = None) -> Clip:
     low = np.clip(np.floor(at).astype(int), 0, len(clip) - 1)
     high = np.minimum(low + 1, len(clip) - 1)
     share = (at - low)[:, None]
-    poses = clip.qpos[low] * (1 - share) + clip.qpos[high] * share
-    poses[:, 3:7] = rot.slerp(clip.qpos[low, 3:7], clip.qpos[high, 3:7], share[:, 0])
+
+    def between(poses: Array) -> Array:
+        result = poses[low] * (1 - share) + poses[high] * share
+        result[:, 3:7] = rot.slerp(poses[low, 3:7], poses[high, 3:7], share[:, 0])
+        return result
+
     nearest = np.where(share[:, 0] < 0.5, low, high)
-    errors = None if clip.errors is None else clip.errors[nearest]
-    fps = clip.fps if fps is None else fps
-    return Clip(fps, poses, clip.planted[nearest], errors, clip.slowed)
+    return Clip(
+        clip.fps if fps is None else fps,
+        between(clip.qpos),
+        clip.planted[nearest],
+        None if clip.errors is None else clip.errors[nearest],
+        None if clip.aims is None else between(clip.aims),
+        clip.slowed,
+    )
 
 
 def velocities(robot: Robot, clip: Clip) -> Array:

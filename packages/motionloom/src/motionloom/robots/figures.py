@@ -21,6 +21,13 @@ _TOUCHING = 0.002
 """Metres by which geoms are in each other before that counts."""
 ROOT_JUMPS = 1000.0
 """Centimetres per second of the root that no humanoid does."""
+SHAKES, UNKNOWN_SHAKES = (12.0, 2.0), 30.0
+"""Metres per second squared of the pelvis: this more than so many times what was aimed at shakes; where nobody knows
+what was aimed at, this does. Walks of robots with all hinges have 2 to 6, of which the motion has half."""
+HEADING_OFF, TILT_OFF = 20.0, 20.0
+"""Degrees of the pelvis from the person's; robots with all hinges stay below 10."""
+_LYING = 0.7
+"""Of a pelvis that faces up or down by so much, heading says nothing."""
 _LOW, _SLOW = 0.02, 0.3
 """Metres and metres per second: a part of a sole that is lower and slower is planted, where nobody says."""
 
@@ -52,6 +59,14 @@ class Figures:
     root_step_cm: float
     """How far the root moves in a frame at most, and by how many radians it turns."""
     root_turn: float
+    root_acceleration: float
+    """Metres per second squared of the pelvis, root mean square: shaking is far above the motion's."""
+    aimed_acceleration: float | None
+    """The same of where the pelvis was to be; None where only the angles are known."""
+    heading_off: float | None
+    """Degrees by which the pelvis faces another way than it was to, 95th percentile; None likewise."""
+    tilt_off: float | None
+    """Degrees by which it leans otherwise, likewise."""
     top_speed: float
     """Radians per second of the fastest hinge, and its name."""
     fastest: str
@@ -83,6 +98,7 @@ class Figures:
             over.append(f"{self.fastest} jumps {self.largest_step:.2f} rad in a frame")
         if self.root_step_cm * self.fps > ROOT_JUMPS or self.root_turn * self.fps > 15.001:
             over.append(f"the root jumps {self.root_step_cm:.1f} cm and {self.root_turn:.2f} rad in a frame")
+        over += self._shaking()
         if self.speed_share is not None and self.speed_share > 1.001:
             over.append(f"{self.fastest} is {self.speed_share:.2f} times as fast as it can be")
         if self.effector_cm is not None and self.effector_cm > 6.0:
@@ -91,10 +107,21 @@ class Figures:
             over.append(f"the robot touches itself in {self.collision_frames} frames")
         return over
 
+    def _shaking(self) -> list[str]:
+        over, aimed = [], self.aimed_acceleration
+        if self.root_acceleration > (UNKNOWN_SHAKES if aimed is None else SHAKES[0] + SHAKES[1] * aimed):
+            instead = "" if aimed is None else f", where the motion has {aimed:.1f}"
+            over.append(f"the pelvis shakes: its acceleration is {self.root_acceleration:.1f} m/s2{instead}")
+        if self.heading_off is not None and self.heading_off > HEADING_OFF:
+            over.append(f"the pelvis faces up to {self.heading_off:.0f} degrees away from the person's heading")
+        if self.tilt_off is not None and self.tilt_off > TILT_OFF:
+            over.append(f"the pelvis leans up to {self.tilt_off:.0f} degrees otherwise than the person's")
+        return over
+
 
 def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figures:
     """The figures of a clip. max_speed: radians per second that no hinge is to exceed, beside what the model states."""
-    corners, masses, touching = _follow(clip, robot)
+    corners, masses, pelvis, touching = _follow(clip, robot)
     planted = clip.planted
     edges = heel_and_toes(corners)
     stays = planted[1:] & planted[:-1]
@@ -131,6 +158,10 @@ def measure(clip: Clip, robot: Robot, *, max_speed: float | None = None) -> Figu
         largest_step=round(float(top.max()) / clip.fps, 4),
         root_step_cm=round(100 * root_step, 3),
         root_turn=round(root_turn, 4),
+        root_acceleration=round(_acceleration(pelvis, clip.fps), 2),
+        aimed_acceleration=None if clip.aims is None else round(_acceleration(clip.aims, clip.fps), 2),
+        heading_off=None if clip.aims is None else _high(_headings_apart(pelvis, clip.aims)),
+        tilt_off=None if clip.aims is None else _high(_tilts_apart(pelvis, clip.aims)),
         top_speed=round(float(top[fastest]), 3),
         fastest=robot.file.hinges[fastest].name,
         speed_share=round(float(share[fastest]), 4) if share[fastest] > 0 else None,
@@ -147,20 +178,40 @@ def _root_steps(root: Array) -> tuple[float, float]:
     return float(moved.max(initial=0.0)), float(2 * np.arccos(turned.min(initial=1.0)))
 
 
+def _acceleration(root: Array, fps: float) -> float:
+    """Metres per second squared of places (frames, 3 or more), root mean square."""
+    steps = np.diff(root[:, :3], n=2, axis=0)
+    return float(np.sqrt((steps**2).sum(axis=1).mean())) * fps**2 if len(steps) else 0.0
+
+
+def _headings_apart(pelvis: Array, aims: Array) -> Array:
+    """Degrees between where two of (frames, 7) face over the ground, in frames in which the second is not lying."""
+    ways = [rot.rotate(poses[:, 3:7], np.array([1.0, 0.0, 0.0])) for poses in (pelvis, aims)]
+    angles = [np.arctan2(way[:, 1], way[:, 0]) for way in ways]
+    return np.degrees(np.angle(np.exp(1j * (angles[0] - angles[1]))))[np.abs(ways[1][:, 2]) < _LYING]
+
+
+def _tilts_apart(pelvis: Array, aims: Array) -> Array:
+    """Degrees between the upward axes of two of (frames, 7)."""
+    ups = [rot.rotate(rot.inverse(poses[:, 3:7]), np.array([0.0, 0.0, 1.0])) for poses in (pelvis, aims)]
+    return np.degrees(np.arccos((ups[0] * ups[1]).sum(axis=1).clip(-1, 1)))
+
+
 def _high(values: Array) -> float:
     return round(float(np.percentile(np.abs(values), 95)), 3) if values.size else 0.0
 
 
-def _follow(clip: Clip, robot: Robot) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """Corners of the soles (frames, 2, 4, 3), centres of mass (frames, 3), and frames in which the robot touches
-    itself."""
+def _follow(clip: Clip, robot: Robot) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
+    """Corners of the soles (frames, 2, 4, 3), centres of mass (frames, 3), places and turns of the pelvis's site
+    (frames, 7), and frames in which the robot touches itself."""
     mujoco = load_mujoco()
 
     model = robot.model
     data = mujoco.MjData(robot.model)
     pairs = list(pairs_apart(robot))
     sites = [model.site(robot.site(f"{side}_ankle")).id for side in SIDES]
-    corners, masses = np.empty((len(clip), 2, 4, 3)), np.empty((len(clip), 3))
+    corners, masses, pelvis = np.empty((len(clip), 2, 4, 3)), np.empty((len(clip), 3)), np.empty((len(clip), 7))
+    hips = model.site(robot.site("pelvis")).id
     touching, nearest = np.zeros(len(clip), dtype=bool), np.zeros(6)
     root = int(model.jnt_bodyid[0])
     for frame, pose in enumerate(clip.qpos):
@@ -168,12 +219,13 @@ def _follow(clip: Clip, robot: Robot) -> tuple[Array, Array, NDArray[np.bool_] |
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         masses[frame] = data.subtree_com[root]
+        pelvis[frame] = *data.site_xpos[hips], *rot.matrix_to_quat(data.site_xmat[hips].reshape(3, 3))
         for number, (side, site) in enumerate(zip(SIDES, sites)):
             corners[frame, number] = data.site_xpos[site] + robot.soles[side] @ data.site_xmat[site].reshape(3, 3).T
         touching[frame] = any(
             mujoco.mj_geomDistance(model, data, one, other, 0.0, nearest) < -_TOUCHING for one, other in pairs
         )
-    return corners, masses, touching if pairs else None
+    return corners, masses, pelvis, touching if pairs else None
 
 
 def _outside(point: Array, corners: Array) -> bool:

@@ -108,7 +108,9 @@ def _clothed(robot: Robot) -> Any:
     mujoco = load_mujoco()
 
     spec, model, skeleton = robot.file.spec, robot.model, robot.skeleton
-    visible = [g for g in range(model.ngeom) if model.geom_rgba[g][3] > 0]
+    visible = [
+        g for g in range(model.ngeom) if model.geom_rgba[g][3] > 0 and model.geom_group[g] < 3
+    ]  # as MuJoCo draws
     bodies = {int(model.body_weldid[model.geom_bodyid[g]]) for g in visible}
     own = {body.id: body for body in spec.bodies}
     thick = _THICK * float(np.linalg.norm(skeleton.offsets[skeleton.index("left_knee")]))

@@ -28,10 +28,10 @@ _FINGERS = "thumb index middle ring pinky little finger gripper palm hand"
 _WORDS = {
     "hip": "hip thigh hpz hpx hpy",
     "knee": "knee shank calf shin kny",
-    "ankle": "ankle foot aky akx",
+    "ankle": "ankle ank foot aky akx",
     "elbow": "elbow forearm lowerarm ely elx",
     "wrist": "wrist wry wrx wrz",
-    "shoulder": "shoulder upperarm shz shx shy arm",
+    "shoulder": "shoulder sho upperarm shz shx shy arm",
     "neck": "neck head aahead",
     "waist": "waist torso abdomen spine trunk chest back lumbar bkz bky bkx",
 }

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from motionloom.errors import MotionloomError, one_line
 from motionloom.reading import read_bytes
 from motionloom.robots.engine import load_mujoco, posed
+from motionloom.robots.trial import try_model
 
 Array = NDArray[np.float64]
 MAX_BYTES = 50_000_000
 MAX_HINGES = 200
+MAX_THINGS = 3000
+"""Bodies, geoms, sites, or points of what is soft."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,28 @@ class Hinge:
 
 
 @dataclass(frozen=True, eq=False)
+class Coupling:
+    """A hinge that another one moves, as gears do: MJCF's ``<equality><joint>``, URDF's ``<mimic>``."""
+
+    hinge: int
+    """Row of the hinge that follows, in `Model.hinges`."""
+    leader: int
+    """Row of the hinge that moves it."""
+    factors: Array
+    """(5,) of a polynomial, from the leader's radians from its rest to the follower's."""
+    rest: Array
+    """(2,) radians of the follower and of the leader in ``qpos0``."""
+
+    def angle(self, angles: Array) -> float:
+        """Radians of the follower where all hinges are at ``angles`` (hinges,)."""
+        return float(self.rest[0] + np.polyval(self.factors[::-1], angles[self.leader] - self.rest[1]))
+
+    def slope(self, angles: Array) -> float:
+        """Radians by which the follower goes for one of its leader."""
+        return float(np.polyval(np.polyder(self.factors[::-1]), angles[self.leader] - self.rest[1]))
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """A robot as MuJoCo knows it: a root that moves freely, and hinges with limits."""
 
@@ -49,6 +74,7 @@ class Model:
     upper: Array
     speed: Array
     """(hinges,) radians per second; infinite where the file states none."""
+    couplings: tuple[Coupling, ...]
     notes: tuple[str, ...]
     """What a user should know about the file, a sentence each."""
 
@@ -60,6 +86,13 @@ class Model:
     def speeds(self, most: float | None) -> Array:
         """(hinges,) radians per second that are kept where none is to exceed ``most`` (None: what the file states)."""
         return self.speed if most is None else np.minimum(self.speed, most)
+
+    def coupled(self, angles: Array) -> Array:
+        """The angles (hinges,), with those that follow others where these move them, within their range."""
+        angles = angles.copy()
+        for one in self.couplings:
+            angles[one.hinge] = np.clip(one.angle(angles), self.lower[one.hinge], self.upper[one.hinge])
+        return angles
 
     def above(self, body: int) -> list[int]:
         """A body and those that it hangs on, the world (0) last."""
@@ -88,10 +121,30 @@ def read_model(path: Path | str, *, meshes: bool = False) -> Model:
     if path.suffix.lower() not in (".xml", ".mjcf", ".urdf"):
         raise MotionloomError(f"a robot's model is MJCF (.xml) or URDF (.urdf); got {path}")
     text = read_bytes(path, max_bytes=MAX_BYTES)
+    load_mujoco()
+    try_model(path, meshes=meshes)
+    spec, model, notes = compiled(path, meshes=meshes)
+    hinges = _hinges(model, path)
+    if not model.nu:
+        notes.append(f"{path} has no actuators; that matters for --physics alone, where no force is limited then")
+    joints = [hinge.joint for hinge in hinges]
+    limited = model.jnt_limited[joints].astype(bool)
+    lower, upper = np.where(limited, model.jnt_range[joints].T, [[-np.inf], [np.inf]])
+    couplings, loose = _couplings(model, hinges)
+    if loose:
+        notes.append(f"{path} has {loose} constraints that close chains of its bodies; they are not kept")
+    return Model(path, spec, model, hinges, lower, upper, _speeds(text, hinges), couplings, tuple(notes))
+
+
+def compiled(path: Path, *, meshes: bool) -> tuple[Any, Any, list[str]]:
+    """The `mujoco.MjSpec` of a file, its `mujoco.MjModel`, and notes for a user.
+
+    Raises `MotionloomError` for one that is no model, has several roots, or more bodies than a robot has.
+    """
     mujoco = load_mujoco()
 
     try:
-        text.decode("utf-8")
+        path.read_bytes().decode("utf-8")
         spec = mujoco.MjSpec.from_file(str(path))
         notes = [*_without_meshes(spec, path, meshes), *_free_root(spec, path)]
         model = spec.compile()
@@ -100,13 +153,29 @@ def read_model(path: Path | str, *, meshes: bool = False) -> Model:
     except (ValueError, RuntimeError) as error:
         line = one_line(" ".join(str(error).split()))[:300]
         raise MotionloomError(f"{path} is no model that MuJoCo reads: {line}") from None
-    hinges = _hinges(model, path)
-    if not model.nu:
-        notes.append(f"{path} has no actuators; that matters for --physics alone, where no force is limited then")
-    joints = [hinge.joint for hinge in hinges]
-    limited = model.jnt_limited[joints].astype(bool)
-    lower, upper = np.where(limited, model.jnt_range[joints].T, [[-np.inf], [np.inf]])
-    return Model(path, spec, model, hinges, lower, upper, _speeds(text, hinges), tuple(notes))
+    most = max(model.nbody, model.ngeom, model.nsite, model.nflexvert)
+    if most > MAX_THINGS:
+        raise MotionloomError(
+            f"{path} has {most:,} bodies, geoms, sites or points; a robot's model has {MAX_THINGS:,} at most"
+        )
+    return spec, model, notes
+
+
+def _couplings(model: Any, hinges: tuple[Hinge, ...]) -> tuple[tuple[Coupling, ...], int]:
+    """Hinges that others move, and how many other constraints there are."""
+    mujoco, rows = load_mujoco(), {hinge.joint: row for row, hinge in enumerate(hinges)}
+    couplings, loose = [], 0
+    for number in np.flatnonzero(model.eq_active0):
+        follower, leader = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+        if model.eq_type[number] != mujoco.mjtEq.mjEQ_JOINT or follower not in rows:
+            loose += 1
+            continue
+        factors, alone = np.array(model.eq_data[number, :5]), leader not in rows
+        leader = follower if alone else leader
+        factors[1:] *= not alone  # a hinge without a leader is held where it is
+        rest = model.qpos0[model.jnt_qposadr[[follower, leader]]]
+        couplings.append(Coupling(rows[follower], rows[leader], factors, rest))
+    return tuple(couplings), loose
 
 
 def _without_meshes(spec: Any, path: Path, meshes: bool) -> list[str]:

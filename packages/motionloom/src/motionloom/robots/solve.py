@@ -47,9 +47,13 @@ class Weight:
 PLANTED, SWINGING = Weight(300.0, 20.0), Weight(15.0, 2.0)
 PELVIS, TRUNK, HEAD = Weight(3.0, 1.0), Weight(0.0, 1.5), Weight(0.0, 0.5)
 HAND, ELBOW = Weight(5.0, 0.1), Weight(2.0, 0.0)
+LACKING = 0.1
+"""What a radian of a foot's turn costs for which its leg has no hinge."""
 POSTURE, CALM = 0.02, 0.3
 """What a radian away from the robot's preferred pose costs, and one from the frame before: where a limb's twist hardly
 shows, as on a straight arm, it stays."""
+COUPLED = 100.0
+"""What a radian costs by which a hinge is not where another one moves it."""
 _SETTLED = 1e-4
 
 
@@ -66,6 +70,7 @@ class Solver:
         hinges = np.arange(robot.model.nv) >= 6  # the root is free
         self.posture, self.calm = (mink.PostureTask(robot.model, cost=c * hinges) for c in (POSTURE, CALM))
         self.posture.set_target(robot.home)
+        self.coupled = [_couplings(robot)] if robot.file.couplings else []
         lower, upper = robot.file.lower + _MARGIN, robot.file.upper - _MARGIN
         step = np.minimum(STEP if speed is None else speed, STEP) / fps
         self.limit = _box(robot, lower, upper, step, most=_SHORT if avoid else np.inf)
@@ -85,7 +90,7 @@ class Solver:
         for number_of, side in enumerate(SIDES):
             weight = PLANTED if targets.planted[number, number_of].any() else SWINGING
             self.tasks[f"{side}_ankle"].set_position_cost(weight.place)
-            self.tasks[f"{side}_ankle"].set_orientation_cost(weight.turn)
+            self.tasks[f"{side}_ankle"].set_orientation_cost(_turning(weight.turn, self.robot.turns[side]))
         if not self.begun:
             self._place_root(targets, number)
         self.limit.before = self.configuration.q.copy() if self.begun else None
@@ -106,13 +111,13 @@ class Solver:
         import mink
 
         calm = [self.calm] if self.begun else []
-        tasks = [*self.tasks.values(), self.posture, *calm]
+        tasks = [*self.tasks.values(), self.posture, *self.coupled, *calm]
         try:
             velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits)
         except mink.NoSolutionFound:  # parts that cannot be kept apart within limits
             velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits[:2])
         pose = self.configuration.integrate(velocity, 1.0)
-        pose[7:] = np.clip(pose[7:], *self.limit.bounds())
+        pose[7:] = np.clip(self.robot.file.coupled(pose[7:]), *self.limit.bounds())
         self.configuration.update(pose)
         return float(np.abs(velocity).max())
 
@@ -153,6 +158,12 @@ def _between(before: Array, after: Array) -> Array:
     """(6,) metres, and radians in the frame of the first, from one place and turn (7,) to another."""
     turned = rot.multiply(rot.inverse(before[3:7]), after[3:7]) if before[3:7].any() else rot.IDENTITY
     return np.concatenate([after[:3] - before[:3], rot.quat_to_rotvec(turned * np.sign(turned[0] or 1.0))])
+
+
+def _turning(cost: float, shares: Array) -> Array:
+    """(3,) cost of a foot's roll, pitch and yaw: little for a turn for which the leg has no hinge, because body and
+    other leg would shake for it."""
+    return np.where(shares > 0.5, cost, min(cost, LACKING))
 
 
 def _tasks(robot: Robot) -> dict[str, Any]:
@@ -203,6 +214,27 @@ def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, most:
             return mink.Constraint(self.matrix[known], room[known])
 
     return Box()
+
+
+def _couplings(robot: Robot) -> Any:
+    """mink's task of hinges that others move."""
+    import mink
+
+    couplings, columns = robot.file.couplings, robot.model.nv
+
+    class Couplings(mink.Task):
+        def compute_error(self, configuration: Any) -> Array:
+            angles = configuration.q[7:]
+            return np.array([angles[one.hinge] - one.angle(angles) for one in couplings])
+
+        def compute_jacobian(self, configuration: Any) -> Array:
+            jacobian = np.zeros((len(couplings), columns))
+            for row, one in zip(jacobian, couplings):
+                row[6 + one.leader] = -one.slope(configuration.q[7:])
+                row[6 + one.hinge] += 1.0
+            return jacobian
+
+    return Couplings(cost=np.full(len(couplings), COUPLED))
 
 
 def _ground(robot: Robot) -> Any:

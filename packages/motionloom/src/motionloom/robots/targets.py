@@ -17,7 +17,7 @@ from motionloom.retarget.joint_map import Override
 from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
 from motionloom.robots.feet import plant
 from motionloom.robots.joints import SIDES
-from motionloom.skeleton import SMPL22
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,6 +25,8 @@ STRAIGHTEST = 0.985
 """Share of a leg's length that hip and ankle are apart at most: nearer to 1 knees snap."""
 _ROLL_LEFT = 0.02
 """Radians of an ankle's roll that are left for what the solver makes of it."""
+_ASIDE = 0.2
+"""Share of a leg's length by which a foot is moved to the side at most."""
 _LOWEST = 0.25
 """Share of a leg's length by which the pelvis goes down at most so that both feet reach."""
 
@@ -72,9 +74,26 @@ def aim(motion: Motion, robot: Robot, *, fps: float, source_map: Override | None
         turns_to_mujoco(motion.world_rotations()),
         planted.reshape(len(planted), 2, 2),
     )
-    targets = _stepping(targets, robot)
+    targets = _stepping(_under_hips(targets, robot), robot)
     down = envelope(lack(targets, robot), round(0.1 * fps))  # so that no leg is stretched out
     return rolled(lowered(targets, down), robot)
+
+
+def _under_hips(targets: Targets, robot: Robot) -> Targets:
+    """With feet that cannot roll moved to the side, for the whole clip, so that their legs stand upright mostly and
+    their soles are flat."""
+    places = targets.places.copy()
+    for number, side in enumerate(SIDES):
+        standing = targets.planted[:, number].any(axis=1)
+        if robot.rolls[side] != (0.0, 0.0) or not standing.any():
+            continue
+        j = targets.joints.index(f"{side}_ankle")
+        left = rot.rotate(targets.turns[:, j], np.array([0.0, 1.0, 0.0])) * [1.0, 1.0, 0.0]
+        left /= np.linalg.norm(left, axis=1, keepdims=True).clip(1e-6)
+        aside = ((targets.place(f"{side}_hip") - places[:, j]) * left).sum(axis=1) - _beside(robot.skeleton, side)
+        most = _ASIDE * _leg(robot.skeleton, side)
+        places[:, j] += float(np.clip(np.median(aside[standing]), -most, most)) * left
+    return replace(targets, places=places)
 
 
 def _stepping(targets: Targets, robot: Robot) -> Targets:
@@ -96,14 +115,20 @@ def lack(targets: Targets, robot: Robot) -> Array:
     pelvis, around = targets.place("pelvis"), targets.turn("pelvis")
     leg = 1.0
     for side in SIDES:
-        bones = [skeleton.offsets[skeleton.index(f"{side}_{part}")] for part in ("knee", "ankle")]
-        leg = sum(float(np.linalg.norm(bone)) for bone in bones)
+        leg = _leg(skeleton, side)
         offset = to_mujoco(skeleton.offsets[skeleton.index(f"{side}_hip")])
         hip = pelvis + rot.rotate(around, np.broadcast_to(offset, pelvis.shape))
         line = targets.place(f"{side}_ankle") - hip
-        most = (STRAIGHTEST * leg) ** 2 - (line[:, :2] ** 2).sum(axis=-1)
+        reach = (STRAIGHTEST * leg) ** 2 + _beside(skeleton, side) ** 2
+        most = reach - (line[:, :2] ** 2).sum(axis=-1)
         need = np.maximum(need, -line[:, 2] - np.sqrt(most.clip(0)))
     return need.clip(0, _LOWEST * leg)
+
+
+def _leg(skeleton: Skeleton, side: str) -> float:
+    """Metres of thigh and shin in the leg's plane."""
+    bones = [skeleton.offsets[skeleton.index(f"{side}_{part}")][1:] for part in ("knee", "ankle")]
+    return sum(float(np.linalg.norm(bone)) for bone in bones)
 
 
 def rolled(targets: Targets, robot: Robot) -> Targets:
@@ -113,14 +138,22 @@ def rolled(targets: Targets, robot: Robot) -> Targets:
         low, high = robot.rolls[side]
         j, sole = targets.joints.index(f"{side}_ankle"), robot.soles[side]
         up = rot.rotate(rot.inverse(turns[:, j]), targets.place(f"{side}_hip") - places[:, j])
-        lean = np.arctan2(up[:, 1], up[:, 2])  # of the leg, seen from the foot: what the ankle has to roll
+        beside = _beside(robot.skeleton, side) / np.linalg.norm(up[:, 1:], axis=1)
+        lean = np.arctan2(up[:, 1], up[:, 2]) - np.arcsin(beside.clip(-1, 1))  # what the ankle has to roll
         upright = up[:, 2] / np.linalg.norm(up, axis=1)  # of a foot that swings behind, lean says nothing
-        over = (lean - lean.clip(low + _ROLL_LEFT, high - _ROLL_LEFT)) * ((upright - 0.5) / 0.25).clip(0, 1)
+        over = (lean - lean.clip(min(low + _ROLL_LEFT, 0.0), max(high - _ROLL_LEFT, 0.0))) * (
+            (upright - 0.5) / 0.25
+        ).clip(0, 1)
         turned = rot.multiply(turns[:, j], rot.rotvec_to_quat(-over[:, None] * np.array([1.0, 0.0, 0.0])))
         edge = np.where(over[:, None] < 0, sole[sole[:, 1].argmin()], sole[sole[:, 1].argmax()]) * [0.0, 1.0, 1.0]
         places[:, j] += rot.rotate(turns[:, j], edge) - rot.rotate(turned, edge)
         turns[:, j] = turned
     return replace(targets, places=places, turns=turns)
+
+
+def _beside(skeleton: Skeleton, side: str) -> float:
+    """Metres to the left of a leg's plane, in which knee and ankle bend, where the axes of the hip meet."""
+    return -float(sum(skeleton.offsets[skeleton.index(f"{side}_{part}")][0] for part in ("knee", "ankle")))
 
 
 def lowered(targets: Targets, down: Array) -> Targets:
