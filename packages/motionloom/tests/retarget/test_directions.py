@@ -20,7 +20,7 @@ TOYS = {
     "kaykit_knight.glb": "a toy with hips as wide as its legs are long",
     "robot_expressive.glb": "a robot with hips as wide as its legs are long",
     "sophia.glb": "a figure with a third of a person's legs",
-    "pybvh_test3.bvh": "lies with pointed toes at the height of its hips: a floor that nothing shows",
+    "pybvh_test3.bvh": "points its toes at rest and never stands flat: nothing shows its soles",
 }
 """Bodies on which legs of other shapes reach the same floor, and why their legs may point elsewhere."""
 PERSONLESS = ("arm_only.bvh", "chicken.bvh", "elephant.bvh", "kenney.glb", "m2m_fox.glb")

@@ -79,10 +79,10 @@ def up_of(places: Array, fps: float, leg: float, rest: Array | None = None) -> U
     if rest is not None:
         scores = {name: score + _REST * max(0.0, float(rest @ AXES[name][0])) for name, score in scores.items()}
     best, second = sorted(scores, key=lambda name: -scores[name])[:2]
-    lies = rest is None and any(
-        seen[name].at_rest > 1 and seen[name].level > seen[best].level + 0.4 for name in _SELDOM if name != best
-    )
-    return Up(best, best == moving and not lies and scores[best] - scores[second] > SURE)
+    lies = [name for name in _SELDOM if rest is None and seen[name].bears_instead_of(seen[best])]
+    sure = best == moving and not lies and scores[best] - scores[second] > SURE
+    flat = [name for name in lies if seen[name].level > 0.8 and seen[name].at_rest > 1.9 and seen[best].level < 0.1]
+    return Up(flat[0] if flat else best, sure)
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,10 @@ class _Seen:
     """How many joints rest on the floor, at most 4, the mean over time."""
     score: float
     """How much speaks for the axis."""
+
+    def bears_instead_of(self, other: "_Seen") -> bool:
+        """Whether who seems to stand along the other axis may as well lie on a floor that is square to this one."""
+        return self.at_rest > 1 and self.level > other.level + 0.4
 
 
 def _look(heights: Array, slow: NDArray[np.bool_], tall: float) -> _Seen:
