@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 PLACE = ROOT / "docs" / "dependencies.md"
@@ -66,7 +67,7 @@ class Component:
 def licence_of(name: str, version: str) -> str:
     """The licence of an installed package of this version, as its metadata has it; empty where there is none."""
     try:
-        told = metadata.distribution(name).metadata
+        told: Any = metadata.distribution(name).metadata
     except metadata.PackageNotFoundError:
         return ""
     if told["Version"].partition("+")[0] != version.partition("+")[0]:

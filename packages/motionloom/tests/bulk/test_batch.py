@@ -364,7 +364,7 @@ def test_a_row_with_what_is_no_text_fails_in_a_sentence_and_the_others_are_made(
     )
     made = list(batch(folder / "jobs.jsonl", folder / "out", options=options(weights), where=ONE))
     assert [one.state for one in made] == ["failed", "failed", "failed", "made"]
-    errors = [one.error or "" for one in made]
+    errors = [one.why for one in made]
     assert "half a character" in errors[0]
     assert "stands in it twice" in errors[1]
     assert "control character U+0007" in errors[2]

@@ -129,10 +129,11 @@ def test_a_damaged_weight_file_is_reported(weights: str, capsys: pytest.CaptureF
     assert file_names() == {"cut.safetensors"}
 
 
-def test_bytes_that_are_no_text_do_not_break_it(weights: str) -> None:
+def test_bytes_that_are_no_text_are_refused(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     """What a shell hands over for a byte that is not UTF-8."""
-    assert generate(weights, "walk \udcff", "--out", "a.npz") == 0
-    assert file_names() == {"a.npz"}
+    assert generate(weights, "walk \udcff", "--out", "a.npz") == 2
+    assert "holds half a character (a lone surrogate, U+DCFF)" in complaint(capsys)
+    assert file_names() == set()
 
 
 def test_the_best_of_several_is_kept(weights: str, capsys: pytest.CaptureFixture[str]) -> None:

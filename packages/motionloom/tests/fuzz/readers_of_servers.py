@@ -309,9 +309,9 @@ def read_film(folder: Path) -> None:
 
 if find_spec("starlette"):
     PROJECT = {"project.json": "json", f"motions/{NAME}.json": "json"}
-    reader("server, read back", asks, {"asks.jsonl": "jsonl"} | PROJECT, read_asks, weight=10)
-    reader("film", film, {"film.json": "json", "0": "raw", "1": "raw"}, read_film, weight=4)
+    reader("server, read back", asks, {"asks.jsonl": "jsonl"} | PROJECT, read_asks, weight=2)
+    reader("film", film, {"film.json": "json", "0": "raw", "1": "raw"}, read_film, weight=2)
 if find_spec("starlette") and find_spec("motionmcp") and find_spec("fastapi"):
-    reader("MMCP", mmcp, {"mmcp.json": "json"}, read_mmcp, weight=6)
+    reader("MMCP", mmcp, {"mmcp.json": "json"}, read_mmcp, weight=2)
 if find_spec("mcp"):
-    reader("MCP", calls, {"calls.jsonl": "jsonl"}, read_calls, weight=6)
+    reader("MCP", calls, {"calls.jsonl": "jsonl"}, read_calls, weight=2)

@@ -109,7 +109,7 @@ def test_what_was_stored_with_half_an_emoji_is_listed_and_read(project: Project)
     rows = saved.rows()
     assert [one["name"] for one in rows] == ["film \ufffd", "\ufffd"]
     assert rows[1]["words"] == ["\ufffd"]
-    assert json.loads(JSONResponse(rows).body) == rows
+    assert json.loads(bytes(JSONResponse(rows).body)) == rows
     data = saved.read()
     assert data is not None
     assert json.loads(data)["name"] == "film \ufffd"
@@ -121,7 +121,7 @@ def test_what_is_known_of_a_motion_is_read_with_half_an_emoji(project: Project) 
     name = "0123456789abcdef"
     (project.motions / f"{name}.json").write_bytes(b'{"people": 1, "prompt": "a \\ud83d"}')
     about, count = project._about(name)
-    assert (json.loads(JSONResponse(about).body), count) == ({"prompt": "a \ufffd"}, 1)
+    assert (json.loads(bytes(JSONResponse(about).body)), count) == ({"prompt": "a \ufffd"}, 1)
 
 
 def test_an_unknown_query_is_refused_with_the_one_that_is_like_it(server: Server, walk: str) -> None:
