@@ -25,7 +25,7 @@ def arrays(count: int, frames: int = 5) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(("count", "tips"), [(30, 4), (77, 13), (22, 0)])
 def test_joints_have_their_names_and_the_root_its_places(tmp_path: Path, count: int, tips: int) -> None:
     made = arrays(count)
-    np.savez(tmp_path / "a.npz", **made)
+    np.savez(tmp_path / "a.npz", posed_joints=made["posed_joints"], global_rot_mats=made["global_rot_mats"])
     motion = load(tmp_path / "a.npz")
     assert (len(motion.skeleton), len(motion.skeleton.ends), motion.fps) == (count, tips, FPS)
     np.testing.assert_allclose(motion.root, made["posed_joints"][:, 0])
@@ -49,7 +49,7 @@ def test_what_is_no_such_motion_is_refused(tmp_path: Path, fault: str) -> None:
         made["global_rot_mats"] = made["global_rot_mats"] * (1.2 if fault == "a stretch" else -1.0)
     if fault == "other joints":
         made["global_rot_mats"] = made["global_rot_mats"][:, :20]
-    np.savez(tmp_path / "a.npz", **made)
+    np.savez(tmp_path / "a.npz", posed_joints=made["posed_joints"], global_rot_mats=made["global_rot_mats"])
     with pytest.raises(MotionloomError, match=r"a\.npz"):
         load(tmp_path / "a.npz")
 
