@@ -75,7 +75,7 @@ def _steps(p: Array, body: Array, fps: float) -> Measures:
     for key in ("toe_lift", "ankle_lift", "thigh", "heel", "swing_knee", "stance_knee"):
         result[key] = (result[key + "_l"] + result[key + "_r"]) / 2
     result["knee_gap"] = result["swing_knee_r"] - result["swing_knee_l"]
-    result["stiff_knee"] = min(result["swing_knee_l"], result["swing_knee_r"])
+    result["stiffer"] = abs(result["knee_gap"])
     return result
 
 
