@@ -127,7 +127,7 @@ def put_on(
     p, feet = _stepped(gait, much, side, noise)
     feet = _feet(gait, feet, much, side)
     ahead = np.stack([limbs.unit((f[:, 1] - f[:, 0]) * [1, 0, 1]) for f in feet], axis=1)
-    _move_pelvis(p, gait, much, side, noise)
+    _move_pelvis(p, gait, much, side)
     _move_trunk(p, gait, much, side, noise)
     ankles = np.stack([f[:, 0] for f in feet], axis=1)
     p += [0, _stretch(gait.places, gait.places[:, [7, 8]]) - _stretch(p, ankles) - much.crouch, 0]
@@ -295,7 +295,7 @@ def _forward(p: Array) -> Array:
     return np.stack([np.sin(facing), 0 * facing, np.cos(facing)], axis=-1)
 
 
-def _move_pelvis(p: Array, gait: Gait, manner: Manner, side: str, noise: _Noise) -> None:
+def _move_pelvis(p: Array, gait: Gait, manner: Manner, side: str) -> None:
     """Heights, sway and list of the pelvis, in place."""
     support = gait.support()
     sign = 1.0 if side == "left" else -1.0
