@@ -136,10 +136,10 @@ def put_on(
     p -= _out_of_reach(p, ankles, gait)[:, None, None] * [0, 1, 0]
     p = with_bones(p, ankles, toes, ahead)
     _move_arms(p, gait, much, side, noise)
-    return p[_seen(gait)]
+    return p[_known_steps(gait)]
 
 
-def _seen(gait: Gait) -> slice:
+def _known_steps(gait: Gait) -> slice:
     """The frames from the first stance of both feet to the last: where a swing goes to beyond is not known."""
     first, last = 0, len(gait.places)
     for spans in gait.spans:
