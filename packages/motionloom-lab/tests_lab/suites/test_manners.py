@@ -60,7 +60,7 @@ def test_the_run_counts_what_it_sees(classifier: manners.Classifier) -> None:
     def fake(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[np.ndarray], float]:
         return [made["march"]] * len(prompts), FPS
 
-    found = manners.asked(fake, classifier, seeds=3, only=("march", "sneak"))
+    found = manners.judge_motions(fake, classifier, seeds=3, only=("march", "sneak"))
     assert found["tried"] == 24
     assert found["right"] == 12
     assert found["table"]["sneak"] == {"march": 12}

@@ -5,9 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from motionloom.features import humanml as hml
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.gestures import true_spans
 from motionloom.skeleton import SMPL22
+from motionloom_train.data.augment import loop
 from motionloom_train.data.gait import read_gait
 from motionloom_train.data.manner_measures import measure
 from motionloom_train.data.mannered import shows, words_of
@@ -24,11 +26,14 @@ HURRIED = "07_01"
 
 @cache
 def walk(name: str) -> np.ndarray:
-    """A recorded walk (frames, 22, 3) of CMU's collection."""
+    """A recorded walk (frames, 22, 3) of CMU's collection that goes on for eight seconds."""
     place = shared("data/manifest.csv").parent
     take = next(take for take in find_takes(place, captions=None) if take.name == name)
     recording = take.read()
-    return uniform_person(recording.positions, recording.fps)  # type: ignore[union-attr]
+    features = hml.encode(uniform_person(recording.positions, recording.fps), heading="corrected")  # type: ignore[union-attr]
+    longer = loop(features, 160)
+    assert longer is not None
+    return hml.decode_positions(longer.astype(np.float64))
 
 
 def made(name: str, person: str = "35_09", *, strength: float = 1.0, side: str = "right", seed: int = 0) -> np.ndarray:
@@ -97,9 +102,10 @@ def test_more_strength_shows_more() -> None:
 def test_a_manner_of_no_strength_is_the_recorded_walk() -> None:
     """Amounts of 0 and factors of 1 leave where the body goes and how it swings."""
     p, source = made("old", strength=0.0), walk("35_09")
-    assert len(p) == pytest.approx(len(source), abs=1)
-    n = min(len(p), len(source))
-    assert np.median(np.linalg.norm(p[:n] - source[:n], axis=-1)) < 0.02
+    first = int(np.linalg.norm(source[:, 0] - p[0, 0], axis=-1).argmin())  # it begins with a step
+    assert first < 20
+    assert len(p) > len(source) - 40
+    assert np.median(np.linalg.norm(p - source[first : first + len(p)], axis=-1)) < 0.01
 
 
 def test_a_left_limp_is_described_by_the_left_leg_alone() -> None:

@@ -329,7 +329,7 @@ def manners(asked: Asked) -> None:
     tables, said = [manners.rows(people)], f"people who were kept out: {manners.line(people)}"
     if seeds:
         generate = generator_of(asked)
-        found["generated"] = manners.asked(
+        found["generated"] = manners.judge_motions(
             generate, classifier, seeds=seeds, seed=asked.get("seed", 0), only=only, progress=say
         )
         tables.append(manners.rows(found["generated"]))

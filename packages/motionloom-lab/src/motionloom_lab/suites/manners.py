@@ -182,7 +182,7 @@ def sentences() -> dict[str, list[str]]:
     return read_table("motionloom_lab.suites", "manners.toml")
 
 
-def asked(
+def judge_motions(
     generate: Generate,
     classifier: Classifier,
     *,

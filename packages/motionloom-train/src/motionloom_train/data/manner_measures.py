@@ -4,6 +4,7 @@ Degrees, metres of the uniform person, seconds. ``l`` and ``r`` are the left and
 """
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from motionloom.kinematics import physics as ph
 from motionloom.kinematics.feet import planted_feet
 from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.physics import Array
+from motionloom_train.data.gait import Gait
 
 _FEET = ((1, 4, 7, 10), (2, 5, 8, 11))
 _ARMS = ((16, 18, 20, 1.0), (17, 19, 21, -1.0))
@@ -31,29 +33,40 @@ def measure(places: Array, fps: float) -> Measures:
     return result
 
 
-def _steps(p: Array, body: Array, fps: float) -> Measures:
-    flags = planted_feet(p, fps)
-    stands = np.stack([flags[:, :2].any(1), flags[:, 2:].any(1)], axis=-1)
-    spans = [[s for s in true_spans(stands[:, i]) if s[1] - s[0] > 2] for i in (0, 1)]
-    seconds = len(p) / fps
-    path = ph.smooth(ph.smooth(p[:, 0] * [1, 0, 1], ph.odd(fps)), ph.odd(fps / 2))
-    facing = ph.smooth(ph.heading(p), ph.odd(fps))
-    pace = float(np.median(ph.speed(p, fps)))
-    holds = []
+class _Foothold(NamedTuple):
+    seconds: float
+    """When, in the middle of its stance."""
+    foot: int
+    outward: float
+    """Metres to the foot's own side of the way."""
+    toes: Array
+    """(3,) metres on the ground."""
+
+
+def _footholds(gait: Gait, path: Array) -> list[_Foothold]:
+    p, ground = gait.places, np.array([1.0, 0.0, 1.0])
+    facing = ph.smooth(ph.heading(p), ph.odd(gait.fps))
+    found = []
     for i, (_, _, ankle, toes) in enumerate(_FEET):
-        for a, b in spans[i]:
+        for a, b in gait.spans[i]:
             m = (a + b) // 2
-            at = ph.turned((p[a:b, ankle] + p[a:b, toes]).mean(axis=0) / 2 - path[m], facing[m])
-            holds.append((m / fps, i, at[0] * (1 - 2 * i), (p[m, toes] * [1, 0, 1])))
-    holds.sort(key=lambda each: each[0])
-    gaps = np.array([b[0] - a[0] for a, b in pairwise(holds) if a[1] != b[1]] or [seconds])
-    lengths = np.array([np.linalg.norm(b[3] - a[3]) for a, b in pairwise(holds) if a[1] != b[1]] or [0.0])
-    widths = np.array([each[2] for each in holds] or [0.1])
-    whole = [[(b - a) / fps for a, b in each if a > 0 and b < len(p)] for each in spans]
-    stance = [float(np.median(each)) if each else 0.6 for each in whole]
-    line = p[-1, 0] - p[0, 0]
-    line = line * [1, 0, 1] / max(float(np.linalg.norm(line[[0, 2]])), 0.3)
+            aside = ph.turned((p[a:b, ankle] + p[a:b, toes]).mean(axis=0) / 2 - path[m], facing[m])[0]
+            found.append(_Foothold(m / gait.fps, i, float(aside) * (1 - 2 * i), p[m, toes] * ground))
+    return sorted(found, key=lambda hold: hold.seconds)
+
+
+def _steps(p: Array, body: Array, fps: float) -> Measures:
+    gait = Gait(p, planted_feet(p, fps), fps)
+    path = ph.smooth(ph.smooth(p[:, 0] * [1, 0, 1], ph.odd(fps)), ph.odd(fps / 2))
+    holds = _footholds(gait, path)
+    steps = [(a, b) for a, b in pairwise(holds) if a.foot != b.foot]
+    gaps = np.array([b.seconds - a.seconds for a, b in steps] or [len(p) / fps])
+    lengths = np.array([np.linalg.norm(b.toes - a.toes) for a, b in steps] or [0.0])
+    widths = np.array([hold.outward for hold in holds] or [0.1])
+    line = (p[-1, 0] - p[0, 0]) * [1, 0, 1]
+    line = line / max(float(np.linalg.norm(line)), 0.3)
     off = (path - path[0]) @ np.array([line[2], 0, -line[0]])
+    pace = float(np.median(ph.speed(p, fps)))
     result = {
         "pace": pace,
         "cadence": 60 / float(np.median(gaps)) if pace > 0.2 else 0.0,
@@ -62,21 +75,27 @@ def _steps(p: Array, body: Array, fps: float) -> Measures:
         "time_spread": float(gaps.std() / max(gaps.mean(), 0.1)),
         "width": float(2 * widths.mean()),
         "width_spread": float(widths.std()),
-        "stance_l": stance[0],
-        "stance_r": stance[1],
-        "stance_ratio": stance[1] / max(stance[0], 0.1),
-        "stance_short": min(stance) / max(*stance, 0.1),
         "wander": float(np.abs(off - np.linspace(off[0], off[-1], len(off))).max()),
-        "both": float((stands.all(axis=1)).mean()),
-        "none": float((~stands.any(axis=1)).mean()),
+        "both": float(gait.standing.all(axis=1).mean()),
+        "none": float((~gait.standing.any(axis=1)).mean()),
     }
     for i, name in enumerate("lr"):
-        result |= _leg(p, body, stands[:, i], _FEET[i], name)
-    for key in ("toe_lift", "ankle_lift", "thigh", "heel", "swing_knee", "stance_knee"):
-        result[key] = (result[key + "_l"] + result[key + "_r"]) / 2
-    result["knee_gap"] = result["swing_knee_r"] - result["swing_knee_l"]
-    result["stiff_knee"] = min(result["swing_knee_l"], result["swing_knee_r"])
-    return result
+        whole = [(b - a) / fps for a, b in gait.spans[i] if a > 0 and b < len(p)]
+        result[f"stance_{name}"] = float(np.median(whole or [0.6]))
+        result |= _leg(p, body, gait.standing[:, i], _FEET[i], name)
+    return result | _of_both_legs(result)
+
+
+def _of_both_legs(m: Measures) -> Measures:
+    names = ("toe_lift", "ankle_lift", "thigh", "heel", "swing_knee", "stance_knee")
+    left, right = m["stance_l"], m["stance_r"]
+    return {
+        **{name: (m[f"{name}_l"] + m[f"{name}_r"]) / 2 for name in names},
+        "stance_ratio": right / max(left, 0.1),
+        "stance_short": min(left, right) / max(left, right, 0.1),
+        "knee_gap": m["swing_knee_r"] - m["swing_knee_l"],
+        "stiffer": abs(m["swing_knee_r"] - m["swing_knee_l"]),
+    }
 
 
 def _leg(p: Array, body: Array, stands: np.ndarray, leg: tuple[int, int, int, int], name: str) -> Measures:

@@ -30,6 +30,8 @@ _OTHERWISE = re.compile(
     r"|careful|creep|carry|object|uneven|stairs|climb|danc|jump|bow|back|float|levitat|moonwalk|stumbl|sway|swing|strange",
 )
 """What a recording has in its name or captions that is in a manner already."""
+_JERK = 4000.0
+"""Metres per second cubed that no joint of a kept clip exceeds; half of the recordings come to 1,000."""
 _SUNK = 0.004
 """Metres by which a kept clip is in the floor at most, on average."""
 
@@ -129,6 +131,8 @@ def is_handed(clip: Clip) -> bool:
 def shows(manner: Manner, places: Array, on: str) -> bool:
     """Whether (frames, 22, 3) metres measure as the manner of who does ``on`` must, and stand on the floor."""
     if len(places) < SHORTEST / 2 or not np.isfinite(places).all() or ph.penetration(places) > _SUNK:
+        return False
+    if ph.jerk(places, FPS).peak > _JERK:
         return False
     return on != manner.on[0] or Rule("", manner.measures).holds(measure(places, FPS), "")
 

@@ -127,7 +127,7 @@ def put_on(
     p, feet = _stepped(gait, much, side, noise)
     feet = _feet(gait, feet, much, side)
     ahead = np.stack([limbs.unit((f[:, 1] - f[:, 0]) * [1, 0, 1]) for f in feet], axis=1)
-    _move_pelvis(p, gait, much, side, noise)
+    _move_pelvis(p, gait, much, side)
     _move_trunk(p, gait, much, side, noise)
     ankles = np.stack([f[:, 0] for f in feet], axis=1)
     p += [0, _stretch(gait.places, gait.places[:, [7, 8]]) - _stretch(p, ankles) - much.crouch, 0]
@@ -136,7 +136,16 @@ def put_on(
     p -= _out_of_reach(p, ankles, gait)[:, None, None] * [0, 1, 0]
     p = with_bones(p, ankles, toes, ahead)
     _move_arms(p, gait, much, side, noise)
-    return p
+    return p[_known_steps(gait)]
+
+
+def _known_steps(gait: Gait) -> slice:
+    """The frames from the first stance of both feet to the last: where a swing goes to beyond is not known."""
+    first, last = 0, len(gait.places)
+    for spans in gait.spans:
+        if spans:
+            first, last = max(first, spans[0][0] - 1), min(last, spans[-1][1] + 1)
+    return slice(first, last) if last - first > 20 else slice(None)
 
 
 class _Noise:
@@ -219,21 +228,21 @@ def _feet(gait: Gait, feet: list[Array], manner: Manner, side: str) -> list[Arra
     for i, (foot, (_, _, _, toes, outward)) in enumerate(zip(feet, FEET)):
         hurt = manner.hurt if _NAMES[i] == side else 0.0
         ahead = foot[:, 1] - foot[:, 0]
-        level = limbs.unit(ahead * [1, 0, 1])
+        level = limbs.unit(ph.smooth(limbs.unit(ahead * [1, 0, 1]), 3))  # a foot on its tip points anywhere
         pitch = np.arctan2(-ahead[:, 1], np.linalg.norm(ahead[:, [0, 2]], axis=-1))
         stands = gait.planted[:, 2 * i] & gait.planted[:, 2 * i + 1]
         flat = float(np.median(pitch[stands])) if stands.any() else np.radians(25)
         rolling = manner.rollover * (1 - 0.55 * min(hurt, 1))
         high = _softly_above(flat + rolling * (pitch - flat), flat + np.radians(manner.heel), manner.heel)
         rest = float(np.percentile(foot[:, 1, 1], 15))
-        air = _air(gait, i)
+        air = smoothstep(2 * _swing_share(gait, i))
         lifted = (foot[:, 1, 1] - rest).clip(0)
         low = manner.clearance * (1 - 0.5 * min(hurt, 1))
         lifted = lifted * (air * low + (1 - air) * (rolling if not manner.heel else 0.0))
         toe = foot[:, 1].copy()
         toe[:, 1] = rest + lifted
         if hurt:
-            toe[:, [0, 2]] += (0.1 * hurt * outward * air[:, None] * _left_of(level))[:, [0, 2]]
+            toe += 0.1 * hurt * outward * air[:, None] * _left_of(_forward(gait.places))
         high = high.clip(-0.6, 1.45)
         heel = toe + LENGTHS[toes] * (np.sin(high)[:, None] * [0, 1, 0] - np.cos(high)[:, None] * level)
         heel[:, 1] = np.maximum(heel[:, 1], 0.045)
@@ -253,17 +262,17 @@ def _softly_above(value: Array, least: float, heel: float) -> Array:
     return least + 0.15 * np.log1p(np.exp(excess.clip(-30, 30)))
 
 
-def _air(gait: Gait, i: int) -> Array:
-    """(frames,) 0 while the foot stands, 1 in the middle of its swing, smooth."""
+def _swing_share(gait: Gait, i: int) -> Array:
+    """(frames,) 0 while the foot stands, else how near it is to the middle of its swing, linearly up to 1."""
     result = np.zeros(len(gait.places))
     spans = gait.spans[i]
     for (_, first), (last, _) in pairwise(spans):
         count = last - first + 2
-        result[first - 1 : last + 1] = np.sin(np.pi * np.arange(count) / (count - 1)).clip(0) ** 0.6
-    if spans:  # swings at either end, of which one half is seen
+        result[first - 1 : last + 1] = 1 - np.abs(np.linspace(-1, 1, count))
+    if spans:  # swings at either end, of which a part is seen
         head, tail = spans[0][0], len(result) - spans[-1][1]
-        result[:head] = np.sin(np.pi / 2 * np.minimum(np.arange(head, 0, -1) / 4, 1))
-        result[len(result) - tail :] = np.sin(np.pi / 2 * np.minimum(np.arange(1, tail + 1) / 4, 1))
+        result[:head] = np.minimum(np.arange(head, 0, -1) / 5, 1)
+        result[len(result) - tail :] = np.minimum(np.arange(1, tail + 1) / 5, 1)
     return result
 
 
@@ -272,7 +281,7 @@ def _raise_knees(p: Array, gait: Gait, feet: list[Array], manner: Manner) -> Non
     if not manner.knee:
         return
     for i, (hip, knee, ankle, _, _) in enumerate(FEET):
-        amount = manner.knee * (_air(gait, i) ** 1.5)[:, None]
+        amount = manner.knee * np.sin(np.pi / 2 * _swing_share(gait, i))[:, None] ** 1.6
         ahead = _forward(p)
         thigh = np.radians(82)
         high = p[:, hip] + LENGTHS[knee] * (np.sin(thigh) * ahead - np.cos(thigh) * np.array([0, 1, 0]))
@@ -286,7 +295,7 @@ def _forward(p: Array) -> Array:
     return np.stack([np.sin(facing), 0 * facing, np.cos(facing)], axis=-1)
 
 
-def _move_pelvis(p: Array, gait: Gait, manner: Manner, side: str, noise: _Noise) -> None:
+def _move_pelvis(p: Array, gait: Gait, manner: Manner, side: str) -> None:
     """Heights, sway and list of the pelvis, in place."""
     support = gait.support()
     sign = 1.0 if side == "left" else -1.0
