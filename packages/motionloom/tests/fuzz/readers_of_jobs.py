@@ -123,7 +123,7 @@ MESSAGES: list[dict[str, Any]] = [
 
 
 def project(folder: Path) -> None:
-    from motionloom.io.npz import save_npz
+    from motionloom.io.npz_writer import save_npz
 
     (folder / "motions").mkdir()
     (folder / "characters").mkdir()

@@ -17,7 +17,7 @@ from typing import Any
 from PIL import Image
 
 from motionloom.errors import MotionloomError, one_line
-from motionloom.io.npz import save_npz
+from motionloom.io.npz_writer import save_npz
 from tests.fuzz.reader import reader
 from tests.fuzz.readers_of_jobs import CONTROL, EDIT, NAME, REQUEST, TIMELINE, project
 from tests.fuzz.readers_of_motions import motion

@@ -14,7 +14,8 @@ from motionloom import rotations as rot
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.io.character import load_character
-from motionloom.io.npz import load_npz, read_array, save_npz
+from motionloom.io.npz import load_npz, read_array
+from motionloom.io.npz_writer import save_npz
 from motionloom.motion import Motion
 from motionloom.retarget import retarget, to_smpl22
 from motionloom.retarget.upright import AXES

@@ -22,7 +22,7 @@ from motionloom.bulk.measures import MEANING, SECOND, SHARED
 from motionloom.bulk.row import hash_file
 from motionloom.io import save, save_scene
 from motionloom.io.bvh_writer import save_bvh
-from motionloom.io.npz import save_npz
+from motionloom.io.npz_writer import save_npz
 from motionloom.motion import Motion
 from motionloom.reading import mended
 

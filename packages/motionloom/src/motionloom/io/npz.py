@@ -1,26 +1,4 @@
-"""Motions as NumPy archives, never with pickle.
-
-Layout (version 1), for a motion of T frames and J joints:
-
-==============  ==================  ===========================================================================
-``version``     int                 1
-``names``       (J,) text           joint names
-``parents``     (J,) int            number of each joint's parent; -1 for joint 0
-``offsets``     (J, 3) float        metres, each joint in its parent's frame at rest
-``ends``        (E,) int            joints that are mere bone tips
-``fps``         float               frames per second
-``root``        (T, 3) float        metres, joint 0 in the world
-``rotations``   (T, J, 4) float     quaternions (w, x, y, z), each joint in its parent's frame
-``translations``  (T, J, 3) float   only where bones change length: metres in the parent's frame
-``positions``   (T, J, 3) float32   metres in the world; for your convenience, not read back
-``on_floor``    bool                whether the rest pose stands on y = 0
-``humanoid``    (H, 2) text         SMPL joint and the joint that plays it, where the file of the body named them
-``sole_joints`` (S,) int            joints of the feet, one for each corner of the mesh below them
-``sole_points`` (S, 3) float        metres in the frames of these joints
-``pose_root``, ``pose_rotations``, ``pose_translations``: some poses of the file that the skeleton is from
-==============  ==================  ===========================================================================
-
-Those from ``translations`` on may be missing.
+"""Reading motions from NumPy archives, never with pickle; `io.npz_writer` has the layout.
 
 An archive without ``rotations`` but with positions (T, 22, 3) of the SMPL joints and an ``fps`` is read too. Such
 archives come in other units and with other axes up: what is surely not metres, or not +Y up, has to be told.
@@ -45,13 +23,12 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.io import text
-from motionloom.io.atomic import atomic_path
+from motionloom.io.npz_writer import VERSION
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import HUMAN_LEGS
 from motionloom.retarget.upright import leg_length, set_upright, upright_places
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
-VERSION = 1
 MAX_JOINTS = 10_000
 _POSITIONS = ("positions", "joints", "motion", "arr_0")
 SPARE_NUMBERS, NUMBERS_PER_BYTE = 8_000_000, 16
@@ -81,51 +58,11 @@ BROKEN = (
 """What damaged archives and arrays raise in zipfile and NumPy."""
 
 
-def save_npz(motion: Motion, path: Path | str, *, packed: bool = True) -> Path:
-    """Write a motion in the layout above and give the path back.
-
-    packed: a tenth smaller, and most of the time that writing takes.
-    """
-    skeleton = motion.skeleton
-    moved = {} if motion.translations is None else {"translations": motion.translations}
-    arrays = {
-        "version": np.array(VERSION),
-        "names": np.array(skeleton.names),
-        "parents": np.array(skeleton.parents, dtype=np.int64),
-        "offsets": skeleton.offsets,
-        "ends": np.array(sorted(skeleton.ends), dtype=np.int64),
-        "fps": np.array(float(motion.fps)),
-        "root": motion.root,
-        "rotations": motion.rotations,
-        "positions": motion.positions().astype(np.float32),
-        **moved,
-        **_body_arrays(skeleton),
-    }
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        (np.savez_compressed if packed else np.savez)(file, **arrays)
-    return Path(path)
-
-
-def _body_arrays(skeleton: Skeleton) -> dict[str, np.ndarray]:
-    """What the file of a body says of it beside its bones."""
-    arrays = {"on_floor": np.array(skeleton.on_floor)}
-    if skeleton.humanoid:
-        arrays["humanoid"] = np.array(sorted(skeleton.humanoid.items()))
-    if skeleton.soles:
-        arrays["sole_joints"] = np.repeat(list(skeleton.soles), [len(points) for points in skeleton.soles.values()])
-        arrays["sole_points"] = np.concatenate(list(skeleton.soles.values()))
-    if (poses := skeleton.poses) is not None:
-        arrays |= {"pose_root": poses.root, "pose_rotations": poses.rotations}
-        if poses.translations is not None:
-            arrays |= {"pose_translations": poses.translations}
-    return arrays
-
-
 def load_npz(path: Path | str, *, fps: float | None = None, unit: float | None = None, up: str | None = None) -> Motion:
     """Read a motion; ``fps`` replaces the stored rate.
 
     ``unit`` is metres per unit of positions, and ``up`` the axis of `motionloom.retarget.upright.AXES` that is up in
-    the file. Raises `MotionloomError` for anything but the layouts above, for a unit of the first of them, which is
+    the file. Raises `MotionloomError` for anything but the layouts that are named at the top, for a unit of the first of them, which is
     in metres, and for positions that are surely not metres or not +Y up where these are None.
     """
     file = _Archive(path, read_arrays(path))

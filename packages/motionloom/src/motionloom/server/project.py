@@ -31,7 +31,8 @@ from typing import Any
 from motionloom.errors import MotionloomError
 from motionloom.formats import characters
 from motionloom.io.atomic import atomic_path
-from motionloom.io.npz import load_npz, save_npz
+from motionloom.io.npz import load_npz
+from motionloom.io.npz_writer import save_npz
 from motionloom.io.text import stored_json
 from motionloom.motion import Motion
 from motionloom.server.limits import Limits
