@@ -62,7 +62,7 @@ def load_npz(path: Path | str, *, fps: float | None = None, unit: float | None =
     """Read a motion; ``fps`` replaces the stored rate.
 
     ``unit`` is metres per unit of positions, and ``up`` the axis of `motionloom.retarget.upright.AXES` that is up in
-    the file. Raises `MotionloomError` for anything but the layouts that are named at the top, for a unit of the first of them, which is
+    the file. Raises `MotionloomError` for anything but the layouts above, for a unit of the first of them, which is
     in metres, and for positions that are surely not metres or not +Y up where these are None.
     """
     file = _Archive(path, read_arrays(path))
