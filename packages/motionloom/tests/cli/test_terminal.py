@@ -87,7 +87,7 @@ def test_a_remark_on_an_unknown_prompt_is_escaped(
     prior = tiny.prior()
     known = known_sentences(["a person walks", HOSTILE], {"walk": 9.0}, prior.text)
     place = save_prior(replace(prior, known=known), tmp_path / "a.safetensors")
-    words = ["generate", f"xyzzy {HOSTILE}", "--seconds", "1", "--steps", "2", "--weights", str(place), "--json"]
+    words = ["generate", "xyzzy \u202e \u200b", "--seconds", "1", "--steps", "2", "--weights", str(place), "--json"]
     assert main([*words, "--out", "x.npz"]) == 0
     out, err = capsys.readouterr()
     assert "nothing like" in err
