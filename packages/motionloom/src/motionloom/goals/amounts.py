@@ -14,7 +14,7 @@ import numpy as np
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.paths import check_speed
-from motionloom.goals.verbs import base_of, kind_of_verb
+from motionloom.goals.verbs import asserted, base_of, kind_of_verb
 from motionloom.kinematics.counts import Counted, Side, count, foot_moves
 from motionloom.motion import ground_pose
 
@@ -88,9 +88,21 @@ RADIUS = 1.0
 """Metres: of a half circle that is walked where its size is not said."""
 _UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
 _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
+_SPEED = re.compile(
+    rf"\bat (?:a (?:speed|pace) of )?{NUMBER} ?(m/s|met(?:er|re)s? (?:per|a) second|km/h|kmh|kph|mph)(?![\w/])"
+)
+_SPEEDS = {"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.447}
+FASTEST = 8.0
+"""m/s that words may say; beyond it the number is left."""
+_QUANTITY = re.compile(
+    rf"(?<![\w.]){NUMBER}[ -]?(m/s|km/h|kmh|kph|mph|(?:kilo|centi|milli)?met(?:er|re)s?|km|cm|mm|m|miles?|yards?|inch(?:es)?"
+    r"|feet|ft|degrees?|deg|°|hours?|h|min(?:ute)?s?|sec(?:ond)?s?|s|times?|reps|repetitions|laps?|rounds?|bpm|steps?|paces|%"
+    r"|percent)(?![\w/])|\b(?:twice|thrice)\b"
+)
+"""A number of which somebody may think that it is kept."""
 _WAY = re.compile(
-    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
-    r"(?!\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
+    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b(?!/)"
+    r"(?! (?:per|a) second|\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
 )
 _DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
 _PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
@@ -199,7 +211,7 @@ def read_amount(text: str, *, around: bool = False) -> Amount | None:
     text: one action (`motionloom.goals.sequence.split_actions`). around: whether to turn around is a turn of 180
     degrees, as between other actions, where the weights alone turn too little.
     """
-    phrase = in_digits(text)
+    phrase = in_digits(asserted(text))
     verbs = [base for word in re.findall(r"[a-z]+", phrase) if word != "left" and (base := base_of(word))]
     if _AGES.search(phrase):
         phrase = _AGES.sub(" ", phrase)
@@ -218,6 +230,28 @@ def read_seconds(text: str) -> float | None:
         return None
     seconds = float(matches[0][1]) * (60.0 if matches[0][2].startswith("min") else 1.0)
     return seconds if 0.2 <= seconds <= MOST_SECONDS else None
+
+
+def unread_numbers(text: str, amount: Amount | None, seconds: float | None) -> list[str]:
+    """The quantities in the words of one action that are not kept: "3 km", "15 times".
+
+    amount, seconds: what was read of it (`read_amount`, `read_seconds`); None for nothing.
+    """
+    kind, phrase = (amount.kind if amount else ""), in_digits(text)
+    kept = {"m": kind == "way", "d": kind in ("turn", "arc"), "p": kind == "steps", "s": seconds is not None}
+    kept["t"] = kind in ("count", "steps") or (kind == "turn" and not _DEGREES.search(phrase))
+    kept["v"] = kind in ("way", "arc") and exact_speed(phrase) is not None
+    names = {"deg": "d", "°": "d", "min": "s", "sec": "s", "ste": "p", "pac": "p", "tim": "t", "twi": "t", "thr": "t"}
+    names |= dict.fromkeys(("cm", "m", "met", "cen", "fee", "ft", "foo", "yar"), "m") | {"s": "s", "rep": "t"}
+    names |= dict.fromkeys(("m/s", "km/", "kmh", "kph", "mph"), "v")
+    return [one[0] for one in _QUANTITY.finditer(phrase) if not kept.get(names.get((one[2] or one[0])[:3], ""), False)]
+
+
+def exact_speed(phrase: str) -> float | None:
+    """The metres per second that a phrase says in numbers, up to `FASTEST`; None without."""
+    match = _SPEED.search(phrase)
+    speed = float(match[1]) * _SPEEDS.get(match[2], 1.0) if match else 0.0
+    return speed if 0.1 <= speed <= FASTEST else None
 
 
 def single_stroke(text: str) -> str:
@@ -328,6 +362,8 @@ def _pace(phrase: str, verbs: list[str]) -> float:
         pace *= 0.65
     elif _direction(phrase, aside=False) in ("left", "right"):
         pace = min(pace, 0.7)
+    if (exact := exact_speed(phrase)) is not None:
+        return exact
     if _is_slow(phrase):
         return 0.65 * pace
     return 1.35 * pace if re.search(r"\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b", phrase) else pace

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
-from motionloom.goals.verbs import base_of, in_plainer_words, kind_of_verb
+from motionloom.goals.verbs import asserted, base_of, in_plainer_words, kind_of_verb
 from motionloom.kinematics.counts import Side, count
 from motionloom.kinematics.gestures import (
     foot_lifts,
@@ -69,7 +69,7 @@ _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
 _GAIT = (
     r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|step"
-    r"|stumbl)"
+    r"|stumbl|creep|prowl|plod|strut|stomp|patrol|stagger|lurch|wander|trudg|pranc)"
     r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b|\bpac(?:es|ing|ed)\b|^pace\b"
 )
 _BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing) (?:up|away)|few steps back)\b|^back (?:up|away)\b"
@@ -79,18 +79,16 @@ _IN_PLACE = (
 )
 _STAYS_THERE = r"\b(?:roll|swing|slip|stretch)\w*\b.*\b(?:shoulder|arm|leg|head|backward)|\btoes\b"
 """What is done backwards on the spot."""
-_WAY_BACK = (
-    r"\b(?:walks? back|walking back|comes? back|returns?)\b(?! (?:and forth|up)\b)"
-    r"(?! to (?:an? |the |his |her |their )?(?:stand|upright|start|initial|original|neutral|normal))"
-)
+_WAY_BACK = r"\b(?:walks? back|walking back|comes? back|returns?)(?= *$|,| again\b| to (?:the start|where|(?:his|her|their) place))"
 _NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
-_NO_THROW = (
-    r"\b(?:punch|kick|jab|hook|uppercut)"
-    r"|\bthrow\w* (?:up )?(?:both|the|his|her|their|its|your|my) (?:\w+ )?(?:arm|hand|head)s?\b"
+_THROWS = (
+    r"\b(?:throw|toss|hurl|pitch|lob|chuck)\w* (?:\w+ ){0,4}(?:balls?|stones?|rocks?|spear|javelin|snowballs?|frisbee|disc(?:us)?"
+    r"|bottles?|grenades?|kni(?:fe|ves)|darts?|axe|bricks?|objects?|it|them|something|stick|boomerang|paper|overhand|underhand)\b"
 )
+"""Objects of throws: a tantrum is none."""
 _TUMBLES = (
     r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
-    r"|rolls? (?:forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
+    r"|rolls? (?:forwards?|backwards?)|(?:forward|backward|shoulder) roll)"
 )
 _SEAT = r"\b(?:chair|seat|bench|stool|sofa|couch)\b"
 _FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
@@ -108,8 +106,8 @@ _NOT_STANDING = (
 )
 """Gestures of who stands, and words of somebody who may do something else."""
 _FALLS = (
-    r"(?<!\bwithout )(?<!\bnot )(?<!\balmost )(?<!\bnearly )(?<!n't )\b(?:falls?|falling|fell|collapses?|collapsing)\b"
-    r"(?! (?:asleep|behind|back|in love|silent)\b)"
+    r"\b(?:falls?|falling|fell|collapses?|collapsing)\b"
+    r"(?! (?:asleep|behind|back|in love|in line|into|silent|ill|apart|short|out|for|off)\b)"
 )
 _ARMS_OUT = r"\barms (?:\w+ )?(?:out\b|spread|outstretched|stretched)(?! (?:of|up|over|above))"
 _LEVEL = r"\b(?:shoulders?|chest|t-?pose|sides?|sideways|out|front)\b"
@@ -143,8 +141,13 @@ class _Phrase:
 
     @property
     def side(self) -> Side:
-        """The one side that it names."""
-        sides = set(re.findall(r"\b(left|right)\b", self.text))
+        """The one side that it names, of a way, or of a limb."""
+        behind = (
+            r"(?:wards?)?\b(?=$|[,.]| (?:side(?! of)|and|then|with|while|as|at|by|for|again|twice|in|into|\w+ly|\d+)\b)"
+        )
+        sides = set(
+            re.findall(rf"\b(left|right)(?:{behind}|(?= (?:\w+ )?{_LIMB[2:]}|[ -]?(?:punch|kick|hook|jab)))", self.text)
+        )
         return "" if len(sides) != 1 else "left" if "left" in sides else "right"
 
 
@@ -165,14 +168,14 @@ def missing(text: str, positions: np.ndarray, fps: float) -> list[str]:
 
 def asks_for_rest(text: str) -> bool:
     """Whether somebody is to stand, sit, lie or wait."""
-    return "state" in _Phrase(text.lower()).kinds
+    return "state" in _Phrase(asserted(text)).kinds
 
 
 def expectations_of(text: str) -> list[Expectation]:
     """What can be checked of the words of one action, and of common words for its rare ones."""
     found: dict[str, Check] = {}
     for words in dict.fromkeys((in_plainer_words(text), text)):
-        phrase = _Phrase(words.lower())
+        phrase = _Phrase(asserted(words))
         limb: Side = phrase.side if phrase.has(_LIMB) else ""
         way: Side = "" if limb else phrase.side
         parts = _repeated(phrase, limb), _ways(phrase, way), _postures(phrase), _arms(phrase, limb), _whole_body(phrase)
@@ -216,7 +219,10 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         yield "a full turn", lambda p, fps: float(np.abs(np.diff(smooth(heading(p), 3))).sum()) > _SPINS
     elif turns and side and not phrase.has(_LIMB):
         yield f"a turn to the {side}", lambda p, fps: sign * turn(p) > _TURNS
-    elif turns and phrase.has(r"\b(?:around|round|about|180|other (?:way|direction)|opposite)\b"):
+    elif turns and phrase.has(
+        r"\b(?:turn|pivot|rotat)\w* (?:\w+ly |right |all the way )?(?:(?:around|round|about)(?! (?:the|an?|corners?)\b)"
+        r"|180|to (?:face )?the (?:other|opposite)|the other way|in the opposite|to look (?:behind|back))"
+    ):
         yield "a half turn", lambda p, fps: _TURNS_ROUND[0] < abs(turn(p)) < _TURNS_ROUND[1]
     elif turns and phrase.has(r"\baway\b"):
         yield "a turn", lambda p, fps: abs(turn(p)) > 2 * _TURNS
@@ -251,7 +257,7 @@ def _travels(phrase: _Phrase) -> bool:
 def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
     if phrase.has(_BACKWARDS):
         return "a way backwards", lambda p, fps: displacement(p, fps).forward < -_GOES
-    if side and phrase.has(r"\b(?:side|strafe|shuffl|over to)"):
+    if side and phrase.has(r"\b(?:side|strafe|shuffl|over to the (?:left|right))"):
         return f"a way to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES
     if phrase.has(r"\b(?:forwards?|ahead)\b") and not side:
         return "a way forward", lambda p, fps: displacement(p, fps).forward > _GOES
@@ -278,7 +284,7 @@ def _postures(phrase: _Phrase) -> Iterator[_Named]:
         yield "sitting on the floor", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & _upright(p), 1.0, fps)
     elif sits:
         yield "sitting", lambda p, fps: bool(seats(p, fps, shortest=0.5))
-    elif phrase.has(_SEAT) and "change" in phrase.kinds:
+    elif phrase.has(r"\b(?:gets?|stands?|rises?|rising|getting) .*\b(?:from|out of|off)\b", _SEAT):
         yield "sitting at the start", lambda p, fps: any(one.begin < 1 for one in seats(p, fps, shortest=0.25))
     if phrase.has(r"\b(?:lie|lies|lying)\b|\blay(?:s|ing)? down\b") and not phrase.has(
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
@@ -303,7 +309,7 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
     hands = {"": (0, 1), "left": (0,), "right": (1,)}[limb]
     rest = [hand for hand in (0, 1) if hand not in hands]
     if phrase.has(
-        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:\w+ ){0,4}(?:arm|hand)s?\b",
+        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:(?!(?:with|in|into|by|from|off|to) )\w+ ){0,4}(?:arm|hand)s?\b",
         r"rais|lift|\bup\b|over (?:\w+ )?head",
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
@@ -319,7 +325,7 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a lowered arm", lambda p, fps: float(hands_height(p[-1:], over="pelvis")[:, list(hands)].max()) < _HANGS
     if phrase.has(_ARMS_OUT):
         yield "arms out", lambda p, fps: _lasts(_arms_out(p), 0.4 * len(p) / fps, fps)
-    if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:\w+ ){0,2}knees?\b"):
+    if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:(?!to )\w+ ){0,2}knees?\b"):
         yield "a raised knee", lambda p, fps: any(_lasts(_knees(p)[:, hand] > -_KNEE, 0.2, fps) for hand in hands)
     if phrase.has(r"\b(?:rais|lift)\w* (?:up )?(?:\w+ ){0,3}(?:leg|foot)\b"):
         yield "a raised foot", lambda p, fps: any(_lasts(foot_lifts(p)[:, hand] > _FOOT, 0.3, fps) for hand in hands)
@@ -333,12 +339,12 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a hand at the head", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(r"\bhands? on (?:the |his |her |their |its |your |my )?(?:hips|waist)\b"):
         yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
-    if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(_NO_THROW):
+    if phrase.has(_THROWS):
         yield "a throw", lambda p, fps: _throws(_wrist_speed(p, fps).max(axis=0), hands)
     if phrase.has(r"(?<!\ba )(?<!\bthe )(?<!\bhis )(?<!\bher )\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
-    if phrase.has(r"\b(?:put|set|lay|place)\w* (?!up)(?:\w+ ){1,4}down\b(?! on an?\b| on the \w+)") and not phrase.has(
-        _LIMB
+    if phrase.has(
+        r"\b(?:put|set|lay|place)\w* (?!up)(?:\w+ ){1,4}down\b", r"\b(?:floor|ground|box|crate|suitcase|bucket)\b"
     ):
         yield "a hand near the floor", lambda p, fps: float(_hands_over_floor(p).min()) < _DOWN
     if phrase.has(

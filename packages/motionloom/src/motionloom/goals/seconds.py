@@ -39,6 +39,9 @@ _ON_STAIRS = 4.0
 _ON_THE_SPOT = re.compile(r"\b(?:jog|run|march|walk)\w* (?:\w+ly )?(?:in place|on (?:the|one) spot)\b", re.IGNORECASE)
 """Who does so for longer leaves the place, or stands."""
 _ONE_FLIGHT = 3.0
+_WHILE = re.compile(r"\bfor (?:a|some|quite a) (?:(long|good|short|little|brief) )?(while|time)\b")
+WORDS = 5.0
+"""Words per second of a long text at most: each tells something."""
 _LONGER = (
     (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
     (_FALLS := re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
@@ -98,7 +101,9 @@ def natural_seconds(text: str) -> float:
         seconds *= 1.3
     elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", words):
         seconds *= 0.8
-    return round(min(max(seconds, SHORTEST), LONGEST), 2)
+    if match := _WHILE.search(words):
+        seconds = max(seconds, 6.0) if match[1] in (None, "long", "good") or match[2] == "time" else seconds
+    return round(min(max(seconds, SHORTEST, len(words.split(" ")) / WORDS), LONGEST), 2)
 
 
 def seconds_alone(text: str) -> float:

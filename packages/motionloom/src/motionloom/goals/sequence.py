@@ -28,6 +28,8 @@ from motionloom.goals.verbs import (
 )
 
 MOST_PARTS = 20
+MOST_WORDS = 400
+"""Words of a text up to which it is parted."""
 _AGAIN = 0.5
 """Share of its time that a gesture takes which is repeated with its reverse."""
 
@@ -67,12 +69,21 @@ _STOPS_TO = re.compile(
 )
 _FINISHES = re.compile(r"(?<!\bthe )\b(?:finish|end)(es|s|ing)? with(?= an? )", re.IGNORECASE)
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
-_AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
-_SUBORDINATE = re.compile(
-    r"\b(?:who|that|which|because|until|till|when|where|since|so that|as if|as though|if|unless|although|whenever)\b",
+_AT_ONCE = re.compile(
+    r"(?<!\ba )(?<!\blong )(?<!\bshort )(?<!\blittle )\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b",
     re.IGNORECASE,
 )
-"""Words with which a clause of time, place or reason begins: what "and" joins behind one may belong to it."""
+_SUBORDINATE = re.compile(
+    r"\b(?:who|that|which|because|until|till|when|where|since|so that|as if|as though|if|unless|although|whenever"
+    r"|never|almost|nearly|instead of|rather than|about to|without|(?:watch|see|hear|listen)\w*)\b",
+    re.IGNORECASE,
+)
+"""Words with which a clause of time, place or reason begins, or what is denied or done by others: what "and" joins
+behind one may belong to it."""
+_SHORTENED = re.compile(
+    r"\b(Mr|Mrs|Ms|Dr|Prof|St|Sgt|Capt|Lt|Col|Gen|Jr|Sr|vs|etc|approx|ca|resp|fig|[A-Z]|[eE]\.g|[iI]\.e|[ap]\.m)\.(?= )"
+)
+"""Words that end in a dot where no sentence ends."""
 _COUNTED = re.compile(
     r"\b(?:a|one|two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ ){0,2}(?:steps?|paces|strides?)\b",
     re.IGNORECASE,
@@ -115,6 +126,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
     One part, the text as it is, where the sentence says one thing or things at once; at most `MOST_PARTS`, else it is
     left whole too.
     """
+    if text.count(" ") > MOST_WORDS:
+        return (Part(text, natural_seconds(text)),)
     whole = _prepared(" ".join(text.split()).rstrip(" .;,"))
     clauses = [clause for sentence in _split_by_time(whole) for clause in _split_by_then(sentence)]
     if len(clauses) > 1:
@@ -138,6 +151,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
         whole_clause = _SUBORDINATE.search(named) or re.search(r"\brun-?up\b", rest, re.IGNORECASE)
         items = [rest] if whole_clause else _split_list(rest)
         parts += [_sentence(named, finite(item)) for item in items]
+    if len(parts) > 2 * MOST_PARTS:
+        return (Part(text, natural_seconds(text)),)
     cycles = repeat_cycles(parts, MOST_PARTS)
     parts = cycles or resolve_ellipsis(parts)
     if not 1 < len(parts) <= MOST_PARTS:
@@ -153,7 +168,7 @@ def split_actions(text: str) -> tuple[Part, ...]:
 
 def _prepared(text: str) -> str:
     """The text without a label before it ("victory emote: ..."), and with verbs for what only sounds like nouns."""
-    text = _SIDESTEPS.sub(r"\1 sidesteps", _LABEL.sub("", text))
+    text = _SIDESTEPS.sub(r"\1 sidesteps", _LABEL.sub("", _SHORTENED.sub(r"\1", text)))
     text = _SIT_TO_STAND.sub("sit down on a chair and stand up", text)
     text = _STOPS_TO.sub(lambda match: f"{match[1]}, {_form_as(match[1], match[2])}", text)
     return _FINISHES.sub(lambda match: {"": "do", "es": "does", "s": "does", "ing": "doing"}[match[1] or ""], text)

@@ -1,7 +1,9 @@
-"""Verbs in the words of prompts: their forms, what kind of action each names, and who does it."""
+"""Verbs in the words of prompts: their forms, what kind of action each names, who does it, and what they deny."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from motionloom.reading import read_table
@@ -53,7 +55,9 @@ _KINDS |= {base: _KINDS[plain.split(" ")[0]] for base, plain in PLAINER.items() 
 
 def subject_of(clause: str) -> str:
     """The words before the first verb: "a tall man" of "a tall man walks"; empty for a bare verb."""
-    words = clause.split(" ")
+    words = clause.split(" ", 8)
+    if is_name(words):  # "Chuck waves", "Mr Smith sits down"
+        return words[0]
     for count, word in enumerate(words[:7]):
         plain = word.strip(",").lower()
         if count == 0 and not re.fullmatch(_SUBJECT_WORDS, plain):
@@ -67,6 +71,16 @@ def subject_of(clause: str) -> str:
     if re.fullmatch(r"someone|somebody|he|she|they", words[0], re.IGNORECASE):
         return words[0]
     return " ".join(words[:2]) if len(words) > 2 and re.fullmatch(r"a|an|the", words[0], re.IGNORECASE) else ""
+
+
+def is_name(words: list[str]) -> bool:
+    """Whether the first of some words, a verb in small letters, is a name here: "Pat claps"."""
+    return (
+        len(words) > 1
+        and words[0][:1].isupper()
+        and words[0].lower() in MOODS["base"]
+        and (words[1] in MOODS["third"] and words[1] not in MOODS["base"])
+    )
 
 
 def mood_of(clause: str) -> str:
@@ -110,6 +124,49 @@ def kind_of_verb(word: str, phrase: str) -> str:
     return _KINDS.get(base, "other")
 
 
+_DETERMINERS = (
+    r"(?:the|an?|his|her|their|its|your|my|some|both|this|that|these|those|another|every|it|them|him|me|us|you"
+    r"|something|somebody|someone)(?! (?:and|then|again|slowly|quickly)\b)"
+)
+_SIZES = (
+    r"(?:\w+ )?(?:(?:\w+[ -])?(?:turns?|circles?|spins?|rolls?|laps?)|half|quarter|full|complete|three[ -]quarter|couple"
+    r"|few|bit|little|while|moments?|seconds?|minutes?|whole|entire|body|times?|\d+|miles?|marathon|races?|way|course"
+    r"|distance|length|block|steps?|stairs|met(?:er|re)s?|hurdles?)\b"
+)
+
+
+def _barred() -> Iterator[re.Pattern[str]]:
+    """The patterns of `asserted`."""
+    gerunds = "|".join(sorted(MOODS["gerund"], key=len, reverse=True))
+    places = {"<det>": _DETERMINERS, "<gerund>": f"(?:{gerunds})", "<size>": _SIZES}
+    places["<rest>"] = r"(?:(?! but | then )[^,;.])*"
+    for pattern in (one for group in _TABLES["barred"].values() for one in group):
+        for name, words in places.items():
+            pattern = pattern.replace(name, words)
+        yield re.compile(pattern)
+
+
+_BARRED = tuple(_barred())
+
+
+@lru_cache(4096)
+def asserted(text: str) -> str:
+    """The words of one action, in small letters, of which something may be expected: "stands and does not turn" as
+    "stands and".
+
+    Left out is what is denied or only intended, what somebody else does, clauses of time and reason, and what is done
+    to a thing; patterns in ``verbs.toml``.
+    """
+    plain = " ".join(text.lower().split())
+    subject = subject_of(" ".join(text.split())).lower()
+    before, rest = plain[: len(subject)], plain[len(subject) :]
+    if any(pattern.search(before + " ") for pattern in _BARRED[:4]):
+        before, rest = "", plain
+    for pattern in _BARRED:
+        rest = pattern.sub(lambda match: f" {match[1]}" if match.re.groups else " ", rest)
+    return " ".join(f"{before}{rest}".split())
+
+
 _NAMED = re.compile(r"\b(?:an?|the|this|that|one|his|her|its|their|my|your|of|on|in|at|with) $", re.IGNORECASE)
 _OF_THE_BODY = re.compile(r"\b(?:arm|leg|shoulder|hand|back|head|body|knee|spine|chest|torso)s? $", re.IGNORECASE)
 
@@ -121,6 +178,12 @@ def _is_verb(mood: str, before: str) -> bool:
     if mood == "past" and _OF_THE_BODY.search(before):  # "shoulders slumped"
         return False
     return not _NAMED.search(before)
+
+
+def _has_object(phrase: str, behind: str) -> bool:
+    """Whether something is done to a thing: a determiner is behind a phrase that ends in no preposition."""
+    ends_open = re.search(r"\b(?:to|into|inside|over|through|along|towards?|for|of|on|off|out)$", phrase)
+    return not ends_open and bool(re.match(rf" {_DETERMINERS} (?!{_SIZES})|[ -]?,? \w+'s\b", behind, re.IGNORECASE))
 
 
 @dataclass(frozen=True)
@@ -152,7 +215,7 @@ class _Phrase:
             if not self.moods:
                 return match.expand(self.better)
             mood = self.moods[match[1].lower()]
-            if not _is_verb(mood, text[: match.start()]):
+            if not _is_verb(mood, text[: match.start()]) or _has_object(match[0], text[match.end() :]):
                 return match[0]
             form = self.plain[mood]
             return (form.capitalize() if match[1][0].isupper() else form) + match.expand(self.better)
@@ -168,14 +231,22 @@ def in_plainer_words(text: str) -> str:
     and with phrases that are read well for some that are not: "pulls the knee up" as "lifts the knee up".
 
     A form that can be a noun ("on patrol") counts as a verb unless a determiner or preposition is before it; a base
-    form only where a sentence begins with it or behind "to".
+    form only where a sentence begins with it or behind "to". Words of which a part is not `asserted`, and verbs with an
+    object, stay as they are.
     """
+    if asserted(text) != " ".join(text.lower().split()):
+        return text
 
     def common(match: re.Match[str]) -> str:
         word = match[0]
         mood = next((mood for mood, forms in MOODS.items() if forms.get(word.lower()) in PLAINER), "")
         before = text[: match.start()]
-        if not mood or not _is_verb(mood, before):
+        if (
+            not mood
+            or not _is_verb(mood, before)
+            or _has_object(word, text[match.end() :])
+            or word[1:] != word[1:].lower()
+        ):
             return word
         verb, _, rest = PLAINER[MOODS[mood][word.lower()]].partition(" ")
         form = next(inflected for inflected, base in MOODS[mood].items() if base == verb)
