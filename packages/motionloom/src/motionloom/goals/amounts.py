@@ -12,6 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from motionloom.goals.goal import FPS, Goal
+from motionloom.goals.heads import head_said
 from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.paths import check_speed
 from motionloom.goals.verbs import asserted, base_of, kind_of_verb
@@ -94,15 +95,22 @@ _SPEED = re.compile(
 _SPEEDS = {"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.447}
 FASTEST = 8.0
 """m/s that words may say; beyond it the number is left."""
+REPEATED = (
+    r"squats|jumps|kicks|punches|(?:push|sit|pull)-?ups|(?:jumping )?jacks|lunges|burpees|crunches|claps|nods|bows|hops"
+    r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches|jabs|swings|throws|leaps"
+    r"|knocks|strikes|sets|bends|dips|twirls"
+)
+"""What is done as often as a number before it says."""
 _QUANTITY = re.compile(
-    rf"(?<![\w.]){NUMBER}[ -]?(m/s|km/h|kmh|kph|mph|(?:kilo|centi|milli)?met(?:er|re)s?|km|cm|mm|m|miles?|yards?|inch(?:es)?"
-    r"|feet|ft|degrees?|deg|°|hours?|h|min(?:ute)?s?|sec(?:ond)?s?|s|times?|reps|repetitions|laps?|rounds?|bpm|steps?|paces|%"
-    r"|percent)(?![\w/])|\b(?:twice|thrice)\b"
+    rf"(?<![\w.]){NUMBER}[ -]?(m/s|km/h|kmh|kph|mph|(?:kilo|centi|milli)?met(?:er|re)s?|km|cm|mm|m|miles?|yards?"
+    r"|inch(?:es)?|feet|ft|degrees?|deg|°|hours?|h|min(?:ute)?s?|sec(?:ond)?s?|s|times?|reps|repetitions|laps?|rounds?|bpm|steps?|paces|%"
+    rf"|percent)(?![\w/])|\b(?:twice|thrice)\b|\b{NUMBER} (?:\w+ ){{0,2}}?(?:{REPEATED})\b"
 )
 """A number of which somebody may think that it is kept."""
 _WAY = re.compile(
     rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b(?!/)"
-    r"(?! (?:per|a) second|\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
+    r"(?! (?:per|a) second|\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board"
+    r"|line|race|dash))"
 )
 _DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
 _PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
@@ -239,12 +247,13 @@ def unread_numbers(text: str, amount: Amount | None, seconds: float | None) -> l
     """
     kind, phrase = (amount.kind if amount else ""), in_digits(text)
     kept = {"m": kind == "way", "d": kind in ("turn", "arc"), "p": kind == "steps", "s": seconds is not None}
-    kept["t"] = kind in ("count", "steps") or (kind == "turn" and not _DEGREES.search(phrase))
+    often = kind in ("count", "steps") or (kind == "turn" and not _DEGREES.search(phrase))
+    kept["t"] = often or head_said(text) is not None
     kept["v"] = kind in ("way", "arc") and exact_speed(phrase) is not None
     names = {"deg": "d", "°": "d", "min": "s", "sec": "s", "ste": "p", "pac": "p", "tim": "t", "twi": "t", "thr": "t"}
     names |= dict.fromkeys(("cm", "m", "met", "cen", "fee", "ft", "foo", "yar"), "m") | {"s": "s", "rep": "t"}
     names |= dict.fromkeys(("m/s", "km/", "kmh", "kph", "mph"), "v")
-    return [one[0] for one in _QUANTITY.finditer(phrase) if not kept.get(names.get((one[2] or one[0])[:3], ""), False)]
+    return [one[0] for one in _QUANTITY.finditer(phrase) if not kept.get(names.get((one[2] or "times")[:3], ""), False)]
 
 
 def exact_speed(phrase: str) -> float | None:

@@ -6,7 +6,7 @@ one is selected that shows the most (`motionloom.tasks.best`).
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,6 +39,7 @@ from motionloom.kinematics.physics import (
     travel,
     turn,
 )
+from motionloom.kinematics.stairs import floating
 from motionloom.motion import heading
 
 Check = Callable[[Array, float], bool]
@@ -65,6 +66,11 @@ _LEAPS, _CHAIR = 0.2, 0.45
 """Metres that the pelvis of who falls rises by at most, and that the feet are over the floor of who lies."""
 _CROSSED = 0.27
 """Metres from a wrist to the other arm's elbow of who has crossed the arms."""
+_CLIMB = re.compile(
+    r"\b(?:(?:up|down)?stairs?|stairway|staircase|ladder|climb\w*|(?:up|down) (?:the|some|a few|a flight of) steps"
+    r"|(?:up|down|on|onto|over|off|from) (?:an?|the) (?:\w+ )?(?:box|platform|ledge|wall|fence|rope|bars?|tree|hill"
+    r"|ramp|slope|mountain|rock|table|trampoline|horse|bike|bicycle)|swim\w*|fl(?:y|ies|ying)|pull-?ups?|hang(?:s|ing)?)\b"
+)
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
 _GAIT = (
@@ -79,11 +85,14 @@ _IN_PLACE = (
 )
 _STAYS_THERE = r"\b(?:roll|swing|slip|stretch)\w*\b.*\b(?:shoulder|arm|leg|head|backward)|\btoes\b"
 """What is done backwards on the spot."""
-_WAY_BACK = r"\b(?:walks? back|walking back|comes? back|returns?)(?= *$|,| again\b| to (?:the start|where|(?:his|her|their) place))"
+_WAY_BACK = (
+    r"\b(?:walks? back|walking back|comes? back|returns?)"
+    r"(?= *$|,| again\b| to (?:the start|where|(?:his|her|their) place))"
+)
 _NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
 _THROWS = (
-    r"\b(?:throw|toss|hurl|pitch|lob|chuck)\w* (?:\w+ ){0,4}(?:balls?|stones?|rocks?|spear|javelin|snowballs?|frisbee|disc(?:us)?"
-    r"|bottles?|grenades?|kni(?:fe|ves)|darts?|axe|bricks?|objects?|it|them|something|stick|boomerang|paper|overhand|underhand)\b"
+    r"\b(?:throw|toss|hurl|pitch|lob|chuck)\w* (?:\w+ ){0,4}(?:balls?|stones?|rocks?|spear|javelin|snowballs?|frisbee"
+    r"|disc(?:us)?|bottles?|grenades?|kni(?:fe|ves)|darts?|axe|bricks?|objects?|it|them|something|stick|boomerang|paper|overhand|underhand)\b"
 )
 """Objects of throws: a tantrum is none."""
 _TUMBLES = (
@@ -109,9 +118,24 @@ _FALLS = (
     r"\b(?:falls?|falling|fell|collapses?|collapsing)\b"
     r"(?! (?:asleep|behind|back|in love|in line|into|silent|ill|apart|short|out|for|off)\b)"
 )
+_DET = r"(?:the|his|her|their|its|your|my)"
+_FALL = r"\b(?:falls?|falling|fell|collapses?|collapsing)(?: \w+ly)?(?: down| over)? (?:\w+ly )?"
+_FALL_WAYS = {
+    rf"{_FALL}(?:backwards?\b|(?:flat )?on(?:to)? {_DET} (?:back|butt|bottom|backside)\b)": (-1, 0),
+    rf"{_FALL}(?:forwards?\b|face[ -](?:down|first)|(?:flat )?on(?:to)? {_DET} (?:face|belly|stomach|knees)\b)": (1, 0),
+    rf"{_FALL}(?:sideways )?to(?:wards?)? {_DET} left\b": (0, 1),
+    rf"{_FALL}(?:sideways )?to(?:wards?)? {_DET} right\b": (0, -1),
+}
+_FALL_NAMES = {(-1, 0): "backwards", (1, 0): "forwards", (0, 1): "to the left", (0, -1): "to the right"}
+_TIPS = 0.1
+"""Metres of the neck beyond the feet, on the average of half a second, of who falls to a side."""
 _ARMS_OUT = r"\barms (?:\w+ )?(?:out\b|spread|outstretched|stretched)(?! (?:of|up|over|above))"
 _LEVEL = r"\b(?:shoulders?|chest|t-?pose|sides?|sideways|out|front)\b"
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
+
+
+FLOOR = "the floor under the feet"
+"""What is asked of every motion whose words do not climb."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +187,13 @@ def share_met(text: str, positions: np.ndarray, fps: float) -> float:
 def missing(text: str, positions: np.ndarray, fps: float) -> list[str]:
     """The names of what the words of one action say plainly and a motion does not show; arguments as of `share_met`."""
     p = np.asarray(positions, dtype=np.float64)
-    return [one.name for one in expectations_of(text) if not one.check(p, fps)]
+    names = [one.name for one in expectations_of(text) if not one.check(p, fps)]
+    return names + [FLOOR] * bool(floating(p, fps) and not climbs([text]))
+
+
+def climbs(texts: Iterable[str]) -> bool:
+    """Whether some words are of stairs, of a ladder, of climbing, or of something that people are on or hang from."""
+    return any(_CLIMB.search(text.lower()) for text in texts)
 
 
 def asks_for_rest(text: str) -> bool:
@@ -230,7 +260,7 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         yield "staying in place", lambda p, fps: float(np.hypot(*_from_start(p).max(axis=0))) < 2 * _GOES
     elif phrase.has(_WAY_BACK) and not phrase.has(_BACKWARDS):
         yield (
-            "a way back",
+            "coming back to the start",
             lambda p, fps: float(np.linalg.norm(p[-1, 0, [0, 2]] - p[0, 0, [0, 2]])) < travel(p, fps) / 2,
         )
     elif phrase.has(r"\bstairs?\b|\bstaircase\b|\bladder\b"):
@@ -262,7 +292,10 @@ def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
     if phrase.has(r"\b(?:forwards?|ahead)\b") and not side:
         return "a way forward", lambda p, fps: displacement(p, fps).forward > _GOES
     short = phrase.has(r"\bstep|\b(?:stand|start|stop|wait)")
-    return "a way", lambda p, fps: travel(p, fps) > (_GOES if short else min(max(_GOES, _PACE * len(p) / fps), _FAR))
+    return (
+        "moving from the spot",
+        lambda p, fps: travel(p, fps) > (_GOES if short else min(max(_GOES, _PACE * len(p) / fps), _FAR)),
+    )
 
 
 def _paces(phrase: _Phrase) -> Iterator[_Named]:
@@ -309,7 +342,8 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
     hands = {"": (0, 1), "left": (0,), "right": (1,)}[limb]
     rest = [hand for hand in (0, 1) if hand not in hands]
     if phrase.has(
-        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:(?!(?:with|in|into|by|from|off|to) )\w+ ){0,4}(?:arm|hand)s?\b",
+        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:(?!(?:with|in|into|by|from|off|to) )\w+ ){0,4}"
+        r"(?:arm|hand)s?\b",
         r"rais|lift|\bup\b|over (?:\w+ )?head",
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
@@ -368,8 +402,17 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
         yield f"a lean to the {bent[1]}", lambda p, fps: _lasts(sign * _sideways(p) > _LEANS, 0.3, fps)
     if phrase.has(r"\bcrawl|\ball fours\b"):
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
+    if (rolls := re.search(r"\brolls? (forward|backward)|\b(forward|backward) rolls?\b", phrase.text)) is not None:
+        way = rolls[1] or rolls[2]
+        yield f"a roll {way}", lambda p, fps: _pitch(p) * (1 if way == "forward" else -1) > np.pi
+    if (aside := re.search(rf"\brolls? (?:over )?(?:on {_DET} \w+ )?to {_DET} (left|right)", phrase.text)) is not None:
+        sign = 1 if aside[1] == "left" else -1
+        yield f"a roll to the {aside[1]}", lambda p, fps: sign * _log_roll(p) > np.pi / 2
     if phrase.has(_FALLS):
         leaps = phrase.has(r"\b(?:jump|leap|flip|div|somersault)")
+        for name, (ahead, left) in _FALL_WAYS.items():
+            if phrase.has(name):
+                yield f"a fall {_FALL_NAMES[ahead, left]}", lambda p, fps, to=(ahead, left): _falls_to(p, fps, to)  # type: ignore[misc]
         yield "a fall", lambda p, fps: _lasts(_over_floor(p) < _DOWN, 0.25, fps) and (leaps or _falls_as_people(p, fps))
 
 
@@ -404,6 +447,43 @@ def _falls_as_people(p: Array, fps: float) -> bool:
     lies = float(end[:, 0, 1].mean()) < _DOWN * leg_length(p)
     leaps = float(p[:, 0, 1].max() - np.median(begin[:, 0, 1])) > _LEAPS
     return not leaps and not (lies and float(end[:, list(ANKLES), 1].max()) > _CHAIR)
+
+
+def _falls_to(p: Array, fps: float, to: tuple[int, int]) -> bool:
+    """Whether the trunk of somebody who goes down tips to that side (ahead, left) of where they were faced."""
+    low = _over_floor(p) < 2 * _DOWN
+    if not low.any():
+        return False
+    first = int(low.argmax())
+    up = max(0, first - round(0.75 * fps))
+    tips = (p[:, J["neck"]] - p[:, list(ANKLES)].mean(axis=1))[first : first + max(1, round(fps / 2)), :][:, [0, 2]]
+    across = p[up, J["left_hip"], [0, 2]] - p[up, J["right_hip"], [0, 2]]
+    left = across / max(float(np.linalg.norm(across)), 1e-9)
+    front = np.array([-left[1], left[0]])
+    return float((tips @ (to[0] * front + to[1] * left)).mean()) > _TIPS
+
+
+def _trunk_turns(p: Array) -> Array:
+    """(frames - 1, 3) radians between frames about the trunk's left, up and front."""
+    left, up = p[:, J["left_shoulder"]] - p[:, J["right_shoulder"]], p[:, J["neck"]] - p[:, 0]
+    up = up / np.linalg.norm(up, axis=-1, keepdims=True)
+    left = left - (left * up).sum(-1, keepdims=True) * up
+    left = left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-9)
+    front = np.cross(left, up)
+    about_left = (np.diff(up, axis=0) * front[:-1]).sum(-1)
+    about_up = (np.diff(front, axis=0) * left[:-1]).sum(-1)
+    return np.stack([about_left, about_up], axis=-1)
+
+
+def _pitch(p: Array) -> float:
+    """Radians by which the trunk turns heels over head, forwards."""
+    return float(_trunk_turns(p)[:, 0].sum())
+
+
+def _log_roll(p: Array) -> float:
+    """Radians by which somebody who lies turns to the left about the spine."""
+    lies = torso_inclination(p)[:-1] > _FLAT
+    return float(_trunk_turns(p)[lies, 1].sum())
 
 
 def _over_floor(p: Array) -> Array:

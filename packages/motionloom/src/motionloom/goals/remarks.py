@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from motionloom.goals.contact import read_contact
 from motionloom.goals.heads import is_of_head
-from motionloom.goals.roles import MARK, prompts_of, without_two
+from motionloom.goals.roles import MARK, SEVERAL, prompts_of, tells_of_several, without_two
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import in_plainer_words, subject_of
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
@@ -31,13 +31,19 @@ be this that one two three something somebody someone very like out off around t
 _LIGHT, _FUNCTION = frozenset(map(stem, _LIGHT_WORDS.split())), frozenset(_FUNCTION_WORDS.split())
 
 
+LINE = 100
+"""Characters of a line at most."""
+
+
 def numbers_read(timeline: Timeline) -> str:
-    """A line with the numbers that were read in the words of a timeline, and the seconds of each; empty for none."""
+    """A line with the numbers that were read in the words of a timeline, the seconds of each, and those that are not
+    kept; empty for none."""
     readings = [
         f"{one.amount}, {sum(segment.seconds for segment in timeline.segments[one.first : one.end]):g} s"
         for one in timeline.readings
     ]
-    return f"read as: {'; '.join(readings)}" if readings else ""
+    kept = [f"read as: {'; '.join(readings)}"] if readings else []
+    return clipped("; ".join(kept + [f"not kept: {', '.join(timeline.unread)}"] * bool(timeline.unread)))
 
 
 def parts_read(timeline: Timeline) -> str:
@@ -46,8 +52,14 @@ def parts_read(timeline: Timeline) -> str:
         return ""
     if [(one.first, one.end) for one in timeline.readings] == [(0, len(timeline.segments))]:
         return ""
-    listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in timeline.segments)
-    return f"one after the other: {listed}"
+    subject = subject_of(timeline.segments[0].text)
+    listed = ", ".join(f"{one.text.removeprefix(subject).strip()} {one.seconds:.1f} s" for one in timeline.segments)
+    return clipped(f"one after the other: {listed}")
+
+
+def clipped(line: str) -> str:
+    """The line, or as much of it as `LINE` characters hold."""
+    return line if len(line) <= LINE else f"{line[: LINE - 4].rsplit(' ', 1)[0]} ..."
 
 
 def remarks_on_two(
@@ -59,20 +71,22 @@ def remarks_on_two(
     the prior knows. Raises `MotionloomError` as the encoder does.
     """
     prompts = {text: prompts_of(text) for text in texts if text.strip()}
+    alike = [text for text, pair in prompts.items() if pair[0] == pair[1]]
     remarks = []
     for text, pair in prompts.items():
         if MARK not in text and pair[0] != pair[1]:
-            remarks.append(Remark(text, f"read as: '{pair[0]} {MARK} {pair[1]}'"))
+            remarks.append(Remark(text, clipped(f"read as: '{pair[0]} {MARK} {pair[1]}'")))
         contact = read_contact(pair)
         remarks += [] if contact is None else [Remark(text, f"read as: {contact}")]
-    if block_known is not None and prompts:
-        matches = nearest(block_known, [without_two(text) for text in prompts], encoder)
+    if block_known is not None and alike:
+        matches = nearest(block_known, [without_two(text) for text in alike], encoder)
         remarks += [
             Remark(text, f"of two people {one.remark()}", one.sentences)
-            for text, one in zip(prompts, matches, strict=True)
+            for text, one in zip(alike, matches, strict=True)
             if not one.near
         ]
-    return remarks + remarks_on([prompt for pair in prompts.values() for prompt in pair], known, encoder)
+    alone = remarks_on([without_two(one) for pair in prompts.values() for one in pair], known, encoder)
+    return remarks + [one for one in alone if one.line != SEVERAL]
 
 
 def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, *, heads: bool = False) -> list[Remark]:
@@ -86,10 +100,11 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, 
     ]
     english = [text for text in distinct if is_english(text)]
     remarks = [
-        Remark(text, f"{text[:60]!r} does not look like English, and these weights know nothing else")
+        Remark(text, f"{text[:50]!r} does not look like English, the one language of these weights")
         for text in distinct
         if text not in english
     ]
+    remarks += [Remark(text, SEVERAL, ()) for text in [one for one in english if tells_of_several(one)][:1]]
     matches = nearest_known(english, known, encoder) if known else []
     return remarks + [Remark(one.prompt, one.remark(), _instead(one)) for one in matches if not one.near]
 

@@ -53,3 +53,21 @@ def read_roles(text: str) -> tuple[str, str] | None:
 def without_two(text: str) -> str:
     """The sentence without "two people", "a couple" and such at its beginning, which say nothing of what is done."""
     return _TWO.sub("", text)
+
+
+SEVERAL = "one person is made here; two are made by: motionloom duet"
+_SEVERAL = re.compile(
+    r"^\W*(?:(?:a|the) couple|(?:the |these )?(?:two|three|four|both|several|some|a group of|a pair of) "
+    r"(?:of them|(?:\w+ )?(?:people|persons|men|women|boys|girls|kids|children|dancers|friends|fighters|boxers"
+    r"|soldiers|players|lovers|guys|brothers|sisters|strangers|fencers|wrestlers|figures|characters))|people|friends|lovers"
+    r"|they (?:both|hug|kiss|fight|shake hands))\b|\beach other\b|\bone another\b|"
+    r"^\W*(?:an?|the|one) \w+ and (?:an?|the|another|his|her) \w+ (?!and\b)"
+    r"|\b(?:hugs?|hugging|kiss(?:es|ing)?|dances? with|dancing with|fights? with|shakes? hands with|hand in hand with"
+    r"|waltz(?:es)? with) (?:an?|the|his|her|another|someone|somebody|each)\b",
+    re.IGNORECASE,
+)
+
+
+def tells_of_several(text: str) -> bool:
+    """Whether a sentence tells of two or more people: "two people fight", "they hug each other"."""
+    return bool(_SEVERAL.search(text)) or read_roles(text) is not None

@@ -3,7 +3,8 @@
 import math
 import re
 
-from motionloom.goals.amounts import read_seconds
+from motionloom.goals.amounts import REPEATED, read_seconds
+from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.verbs import base_of, kind_of_verb
 
 SHORTEST = 1.2
@@ -50,51 +51,28 @@ _LONGER = (
 """What takes longer than others of its kind."""
 MOST_AT_ONCE = 9.8
 """The longest motion of the recordings that the weights were trained on."""
-_REPEATED = re.compile(
-    r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ ){0,2}"
-    r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
-    r"|burpees|crunches|claps|nods|bows|hops"
-    r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches"
-    r"|laps|reps|repetitions|jabs"
-    r"|swings|throws|leaps|knocks|strikes|sets|rounds|bends|dips|twirls)\b"
-)
-_NUMBER = {
-    "once": 1,
-    "twice": 2,
-    "thrice": 3,
-    "two": 2,
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "six": 6,
-    "seven": 7,
-    "eight": 8,
-    "nine": 9,
-    "ten": 10,
-    "several": 4,
-    "few": 3,
-}
+_REPEATED = re.compile(rf"\b{NUMBER} (?:\w+ ){{0,2}}(?:{REPEATED}|laps|reps|repetitions|rounds)\b")
 
 
 def natural_seconds(text: str) -> float:
     """How long an action takes people, by its kind, its numbers and how quickly it is done; 1.2 to 12 s."""
-    words = text.lower()
+    words = re.sub(r"\bseveral\b|\b(?:a )?few\b", "3", in_digits(text))
     if (explicit := read_seconds(text)) is not None:
         return max(explicit, SHORTEST)
     kind = _kind(words)
     seconds = _SECONDS[kind]
     if kind in ("change", "event") or _FALLS.search(words):  # "stumbles and falls"
         seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
-    if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
-        seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
-    elif match := re.search(r"\b(\d+|[a-z]+) (?:times|reps|repetitions)\b", words):
-        number = _count(match[1]) or 2
+    if match := re.search(rf"\b(?:{NUMBER}|\w+) (?:small |large |big |slow |quick )?steps\b", words):
+        seconds = 1.0 + 0.6 * _count(match[1] or "3")
+    elif match := re.search(rf"\b(?:{NUMBER}|[a-z]+) (?:times|reps|repetitions)\b", words):
+        number = _count(match[1] or "2")
         quick = kind == "gesture" and _QUICK.search(words)
         seconds = 2.0 + 0.8 * number if quick else seconds * (0.4 + 0.6 * number)
     elif re.search(r"\b(twice|thrice)\b", words):
         seconds *= 1.6 if "twice" in words else 2.2
     elif match := _REPEATED.search(words):
-        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
+        seconds *= 0.4 + 0.6 * _count(match[1])
     if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", words):
         seconds = max(seconds, 8.0 if kind == "locomotion" else 6.0)
     if re.search(r"\b(slowly|slow|carefully|gently)\b", words):
@@ -131,5 +109,5 @@ def _kind(words: str) -> str:
     return next((kind_of_verb(word, words) for word in re.findall(r"[a-z]+", words) if base_of(word)), "other")
 
 
-def _count(word: str) -> int:
-    return int(min(float(word), 1000)) if re.fullmatch(r"\d+(?:\.\d+)?", word) else _NUMBER.get(word, 0)
+def _count(number: str) -> int:
+    return int(min(float(number), 1000))

@@ -70,7 +70,8 @@ _STOPS_TO = re.compile(
 _FINISHES = re.compile(r"(?<!\bthe )\b(?:finish|end)(es|s|ing)? with(?= an? )", re.IGNORECASE)
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(
-    r"(?<!\ba )(?<!\blong )(?<!\bshort )(?<!\blittle )\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b",
+    r"(?<!\ba )(?<!\blong )(?<!\bshort )(?<!\blittle )\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time"
+    r"|simultaneously)\b",
     re.IGNORECASE,
 )
 _SUBORDINATE = re.compile(

@@ -56,7 +56,9 @@ _KINDS |= {base: _KINDS[plain.split(" ")[0]] for base, plain in PLAINER.items() 
 def subject_of(clause: str) -> str:
     """The words before the first verb: "a tall man" of "a tall man walks"; empty for a bare verb."""
     words = clause.split(" ", 8)
-    if is_name(words):  # "Chuck waves", "Mr Smith sits down"
+    if len(words) > 1 and re.fullmatch(r"(?:Mr|Mrs|Ms|Dr|Prof|Sir|Lady)\.?", words[0]):
+        return " ".join(words[:2])
+    if is_name(words):  # "Chuck waves"
         return words[0]
     for count, word in enumerate(words[:7]):
         plain = word.strip(",").lower()
@@ -129,8 +131,8 @@ _DETERMINERS = (
     r"|something|somebody|someone)(?! (?:and|then|again|slowly|quickly)\b)"
 )
 _SIZES = (
-    r"(?:\w+ )?(?:(?:\w+[ -])?(?:turns?|circles?|spins?|rolls?|laps?)|half|quarter|full|complete|three[ -]quarter|couple"
-    r"|few|bit|little|while|moments?|seconds?|minutes?|whole|entire|body|times?|\d+|miles?|marathon|races?|way|course"
+    r"(?:\w+ )?(?:(?:\w+[ -])?(?:turns?|circles?|spins?|rolls?|laps?)|half|quarter|full|complete|three[ -]quarter"
+    r"|couple|few|bit|little|while|moments?|seconds?|minutes?|whole|entire|body|times?|\d+|miles?|marathon|races?|way|course"
     r"|distance|length|block|steps?|stairs|met(?:er|re)s?|hurdles?)\b"
 )
 
@@ -160,7 +162,7 @@ def asserted(text: str) -> str:
     plain = " ".join(text.lower().split())
     subject = subject_of(" ".join(text.split())).lower()
     before, rest = plain[: len(subject)], plain[len(subject) :]
-    if any(pattern.search(before + " ") for pattern in _BARRED[:4]):
+    if any(pattern.search(before + " ") for pattern in _BARRED[:4]) or re.search(rf"\w {_DETERMINERS}", before + " "):
         before, rest = "", plain
     for pattern in _BARRED:
         rest = pattern.sub(lambda match: f" {match[1]}" if match.re.groups else " ", rest)
@@ -224,6 +226,11 @@ class _Phrase:
 
 
 PHRASES = tuple(_Phrase.of(*line) for line in _TABLES["phrases"].items())
+
+
+def rare_verb(text: str) -> str:
+    """The first verb in a text that is in `PLAINER`, in its form there; empty without."""
+    return next((word for word in re.findall("[A-Za-z]+", text) if base_of(word.lower()) in PLAINER), "")
 
 
 def in_plainer_words(text: str) -> str:

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from motionloom.diffusion.sampling import row_seed
-from motionloom.goals.expected import missing
-from motionloom.goals.remarks import Remark
+from motionloom.goals.expected import FLOOR, missing
+from motionloom.goals.remarks import Remark, clipped
 from motionloom.goals.segment import Segment
-from motionloom.goals.verbs import in_plainer_words
+from motionloom.goals.verbs import in_plainer_words, rare_verb
 from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED
 from motionloom.tasks.long import compose
@@ -33,11 +33,17 @@ def attempt_seed(seed: int, number: int) -> int:
     return seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
 
 
+PLAINER_FROM = 2
+"""The attempt from which on the words are plainer ones; those before are of the words as they stand."""
+
+
 def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
-    """A sentence with texts that are generated as others; empty where none is."""
+    """A sentence with verbs whose manner is lost, or what texts are generated as; empty where none is."""
     changed = dict.fromkeys((one, other) for one, other in texts if one != other)
-    both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
-    return both_ways and f"{both_ways}, which these weights know better"
+    lost = [f"'{verb}'" for one, _ in changed if (verb := rare_verb(one))]
+    if lost:
+        return clipped(f"the manner of {', '.join(lost)} is not shown")
+    return clipped(", ".join(f"sampled in other words: '{other}'" for _, other in changed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +61,10 @@ class Reattempted:
         replaced = {segments[i].text: text for i, text in self.again.items() if text != segments[i].text}
         remarks = [Remark(one, replacement_line([(one, other)])) for one, other in replaced.items()]
         for i, names in self.missing.items():
-            text = segments[i].text
-            remarks.append(Remark(text, f"'{text}': not found in {ATTEMPTS} attempts: {', '.join(names)}"))
+            text, names = segments[i].text, [name for name in names if name != FLOOR]  # who floats is lowered
+            if not names:
+                continue
+            remarks.append(Remark(text, clipped(f"'{text[:40]}': not shown: {', '.join(names)}")))
         return remarks
 
 
@@ -98,10 +106,11 @@ def reattempt(
             for number in range(1, attempts):
                 if not best[i]:
                     break
-                again = _sample_again(timed, motion, i, plain[i], number, start, progress)
+                words = plain[i] if number >= PLAINER_FROM else timed.segments[i].text
+                again = _sample_again(timed, motion, i, words, number, start, progress)
                 found = unseen(again, near)
                 if _total(found) < _total({k: best[k] for k in found}):
-                    motion, best, kept[i] = again, best | found, plain[i]
+                    motion, best, kept[i] = again, best | found, words
     return Reattempted(motion, kept, {i: names for i, names in best.items() if names})
 
 

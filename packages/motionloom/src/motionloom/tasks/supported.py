@@ -3,8 +3,7 @@
 Each of these leaves a motion that has nothing of the kind as it is.
 """
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,22 +12,14 @@ from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
-from motionloom.kinematics.stairs import UP, falls_from_above, hovering
+from motionloom.kinematics.stairs import UP, falls_from_above, floating, hovering
 from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
 
-_CLIMB = re.compile(
-    r"\b(?:(?:up|down)?stairs?|stairway|staircase|ladder|climb\w*|(?:up|down) (?:the|some|a few|a flight of) steps)\b"
-)
 SUNK = 0.02
 """Metres by which a hand or the head may be under the floor."""
 REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
 """Metres over the floor where the joint of a hand, and of the head, comes to lie."""
-
-
-def climbs(texts: Iterable[str]) -> bool:
-    """Whether some words are of stairs, of a ladder, or of climbing."""
-    return any(_CLIMB.search(text.lower()) for text in texts)
 
 
 def is_elevated(motion: Motion) -> bool:
@@ -47,6 +38,8 @@ def add_support(motion: Motion, *, stairs: bool = True) -> Motion:
         motion = _grounded(motion, places)
     elif stairs:
         motion = _on_stairs(motion, places)
+    else:
+        motion = lowered(motion)
     places, goal = motion.positions(), Goal.nothing(len(motion))
     for joint, rest in REST.items():
         sunk = places[:, joint, 1] < rest - SUNK
@@ -66,6 +59,18 @@ def add_support_between(motion: Motion, spans: Sequence[tuple[int, int]]) -> Mot
         root=np.where(frames[:, 0], supported.root, motion.root),
         rotations=np.where(frames, supported.rotations, motion.rotations),
     )
+
+
+def lowered(motion: Motion) -> Motion:
+    """The motion with whoever floats on the floor (`floating`); the same where nobody does."""
+    lowest = motion.positions()[..., 1].min(axis=1)
+    drop = np.zeros(len(motion))
+    for first, end in floating(motion.positions(), motion.fps):
+        drop[first:end] = lowest[first:end]
+    if not drop.any():
+        return motion
+    drop = np.minimum(smooth(drop, odd(motion.fps / 4)), np.maximum(lowest, 0.0))
+    return clean_feet(replace(motion, root=motion.root - drop[:, None] * np.array([0.0, 1.0, 0.0])))
 
 
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:

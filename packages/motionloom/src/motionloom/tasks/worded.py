@@ -22,9 +22,9 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
-from motionloom.goals.expected import missing
+from motionloom.goals.expected import climbs, missing
 from motionloom.goals.heads import head_said
-from motionloom.goals.remarks import numbers_read, parts_read
+from motionloom.goals.remarks import clipped, numbers_read, parts_read
 from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
@@ -35,11 +35,11 @@ from motionloom.tasks.adapting import lines_by_text, remarks_on_words
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
-from motionloom.tasks.reattempts import ATTEMPTS, attempt_seed, reattempt, replacement_line
+from motionloom.tasks.reattempts import ATTEMPTS, PLAINER_FROM, attempt_seed, reattempt, replacement_line
 from motionloom.tasks.redraw import Timed
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
-from motionloom.tasks.supported import add_support
+from motionloom.tasks.supported import add_support, lowered
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.tasks.watching import watching
 from motionloom.weights.prior import Prior
@@ -131,7 +131,7 @@ class Worded:
         end where nothing happens."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
         looked = self.attempts > 1 and self.missing
-        unseen = f"not found in {self.attempts} attempts: {', '.join(self.missing)}" if looked else ""
+        unseen = clipped(f"not shown in {self.attempts} attempts: {', '.join(self.missing)}") if looked else ""
         problems = [amount.problem for amount in self.amounts]
         return [*filter(None, [self.replaced, *problems, unseen, self.stillness(of=share)])]
 
@@ -157,7 +157,7 @@ class Worded:
             or self.motion.seconds - begin < of * self.motion.seconds
         ):
             return ""
-        return f"it ends standing still, from {begin:.1f} s on: what these weights do not know often does"
+        return f"it stands still from {begin:.1f} s on"
 
 
 def read(
@@ -263,15 +263,21 @@ def generate_timelines(
                 some = several[begin : begin + _TOGETHER]
                 own = seeds[done : done + len(some)]
                 best = _best_attempts(prior, some, seeds=own, sampling=sampling, progress=progress, **how)
-                yield from map(_with_heads, best)
+                yield from (_with_heads(_on_the_floor(one)) if foot_lock else _with_heads(one) for one in best)
                 done += len(some)
             continue
         for one in several:
             best_try = _best_try(prior, one, sampling=replace(sampling, count=1), seed=seeds[done], **how)
-            yield _with_heads(best_try)
+            yield _with_heads(_on_the_floor(best_try) if foot_lock else best_try)
             done += 1
             if progress:
                 progress(done, len(timelines))
+
+
+def _on_the_floor(one: Worded) -> Worded:
+    """The motion with whoever floats on the floor, unless the words are of climbing (`supported.lowered`)."""
+    motion = one.motion if climbs(part.text for part in one.timeline.segments) else lowered(one.motion)
+    return one if motion is one.motion else replace(one, motion=motion)
 
 
 def _with_heads(one: Worded) -> Worded:
@@ -301,7 +307,7 @@ def _best_attempts(
     unseen, finished = list(range(len(timelines))), 0
     first, later = _once_at_its_end(progress)
     for number in range(attempts):
-        words = plainer if number else timelines
+        words = plainer if number >= PLAINER_FROM else timelines
         sampled = generate_each(
             prior,
             [words[i].segments[0].text for i in unseen],
@@ -314,7 +320,7 @@ def _best_attempts(
         again = set(unseen)
         for place, motion in _unwatched(sampled) if number else sampled:
             i = unseen[place]
-            attempt = _or_mirrored(Worded(motion, words[i], (), attempts, timelines[i] if number else None))
+            attempt = _or_mirrored(Worded(motion, words[i], (), attempts, timelines[i]))
             if i not in best or len(attempt.missing) < len(best[i].missing):
                 best[i] = attempt
             if number + 1 == attempts or not best[i].missing:
@@ -356,10 +362,10 @@ def _best_try(
     in_blocks = attempts > 1 and len({segment.text for segment in timeline.segments}) > 1
     for number in range(TRIES if counts else 1 if in_blocks else attempts):
         said = _scaled(timeline, shares)
-        now = said.plainer if number else said
+        now = said.plainer if number >= PLAINER_FROM else said
         own = replace(sampling, seed=attempt_seed(seed, number), first=0)
         motion = _sample_timeline(prior, now, own, foot_lock)
-        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said if number else None)
+        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said)
         candidate = _or_mirrored(candidate)
         off = _missed(candidate)
         if best is None or off < least:
@@ -375,7 +381,8 @@ def _best_try(
         own = replace(sampling, seed=seed, first=0)
         best = _blocks_again(best, Timed(prior, best.timeline.segments, None, own, foot_lock))
     several = len(timeline.segments) > 1
-    return replace(best, motion=add_support(best.motion)) if several and foot_lock else best
+    stairs = climbs(segment.text for segment in timeline.segments)
+    return replace(best, motion=add_support(best.motion, stairs=stairs)) if several and foot_lock else best
 
 
 def _missed(one: Worded) -> tuple[float, int]:
