@@ -15,9 +15,11 @@ from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.heads import head_said
 from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.paths import check_speed
-from motionloom.goals.verbs import asserted, base_of, kind_of_verb
+from motionloom.goals.verbs import asserted, base_of, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Counted, Side, count, foot_moves
 from motionloom.motion import ground_pose
+
+_WORDS = word_patterns("amounts")
 
 Kind = Literal["turn", "way", "steps", "arc", "count"]
 Direction = Literal["forward", "backward", "left", "right"]
@@ -89,9 +91,6 @@ RADIUS = 1.0
 """Metres: of a half circle that is walked where its size is not said."""
 _UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
 _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
-_SPEED = re.compile(
-    rf"\bat (?:a (?:speed|pace) of )?{NUMBER} ?(m/s|met(?:er|re)s? (?:per|a) second|km/h|kmh|kph|mph)(?![\w/])"
-)
 _SPEEDS = {"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.447}
 FASTEST = 8.0
 """m/s that words may say; beyond it the number is left."""
@@ -101,47 +100,6 @@ REPEATED = (
     r"|knocks|strikes|sets|bends|dips|twirls"
 )
 """What is done as often as a number before it says."""
-_QUANTITY = re.compile(
-    rf"(?<![\w.]){NUMBER}[ -]?(m/s|km/h|kmh|kph|mph|(?:kilo|centi|milli)?met(?:er|re)s?|km|cm|mm|m|miles?|yards?"
-    r"|inch(?:es)?|feet|ft|degrees?|deg|°|hours?|h|min(?:ute)?s?|sec(?:ond)?s?|s|times?|reps|repetitions|laps?|rounds?|bpm|steps?|paces|%"
-    rf"|percent)(?![\w/])|\b(?:twice|thrice)\b|\b{NUMBER} (?:\w+ ){{0,2}}?(?:{REPEATED})\b"
-)
-"""A number of which somebody may think that it is kept."""
-_WAY = re.compile(
-    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b(?!/)"
-    r"(?! (?:per|a) second|\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board"
-    r"|line|race|dash))"
-)
-_DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
-_PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
-_TURNS_ROUND = re.compile(
-    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:around|round|about|back)"
-    r"(?= *$|[,.]| to (?:face|go|walk|run|the (?:left|right|other|opposite))| (?:again|\w+ly|once)\b)"
-)
-"""A half turn, unless another size is said."""
-_TURNS_ASIDE = re.compile(
-    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:to )?(?:the |his |her |their |its |your )?(?:left|right) *$"
-)
-"""Between other actions a quarter turn."""
-_TURNS_OFTEN = re.compile(rf"\b{NUMBER} (?:full |complete |whole )?(?:turns|spins|pirouettes|rotations)\b")
-_ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi|full|complete|whole|0\.5)(?: of a)?[ -]?circles?\b")
-_CIRCLE = re.compile(r"\bin a (?:(?:(?:counter|anti)?[ -]?clockwise|small|tight|right|left|full) )*circle\b(?! of)")
-_STEPS = re.compile(
-    rf"(?<!up )(?<!down )(?:\b{NUMBER}|(?:(?<=takes )|(?<=take )|(?<=taking )|(?<=took ))a(?:n)?(?: single)?)"
-    r"(?: (small|tiny|short|baby|little|big|large|long|giant|huge|quick|slow|careful))?(?: (side|backward|forward))?"
-    r"[ -]?(?:steps?|paces|strides?|sidesteps?)\b"
-)
-_STEPS_OFTEN = re.compile(
-    rf"\b((?:side)?step(?:s|ped|ping)?)\b(?! (?:up|down|on|over|onto)\b)((?: to)?(?: the)?(?: \w+)?) {NUMBER} times?\b"
-)
-_SECONDS = re.compile(
-    r"(?<!\bafter )(?<!\bin )(?<!\bwithin )(?<!\bevery )(?<!\blast )(?<!\bfirst )(?<!\bof )"
-    rf"(?<![\w.]){NUMBER}[ -]?(s|secs?|seconds?|mins?|minutes?)\b(?! (?:ago|later|before|after|lap|hand|time))"
-)
-_OFTEN = re.compile(rf"\b(once|twice|thrice|{NUMBER} (?:times?|reps|repetitions))\b")
-_OFTEN_OF_LIMBS = re.compile(
-    r"\b(?:at|more than|once (?:upon|again|more)|all at|for) (?:once|1 time)\b|\bonce (?:upon|again|more)\b"
-)
 _COUNTED: tuple[tuple[str, Counted], ...] = (
     (r"jumping[ -]?jacks?|star jumps?", "jumping jacks"),
     (r"jump\w*|leaps?|leaping", "jumps"),
@@ -152,41 +110,8 @@ _COUNTED: tuple[tuple[str, Counted], ...] = (
     (r"(?<!a )bow(?:s|ing|ed)?(?! tie)", "bows"),
     (r"claps?|clapping|clapped", "claps"),
 )
-_MANY = re.compile(
-    rf"(?<!number )\b{NUMBER} (?:(?!(?:and|or|then|with|of|to|the|on|in|at|for|steps?|times?|seconds?|feet|hands)\b)"
-    r"[a-z-]+ ){0,2}"
-    r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|hooks?|uppercuts?"
-    r"|bows?|claps?)\b"
-)
-_COUNTS_ANOTHER = re.compile(
-    r"\b(?:while|every|per|without (?:the |an? )?(?:jump|hop|kick|clap)\w*)\b"
-    rf"|^(?!.*\b(?:jump|hop|squat|kick|punch|bow|clap|leap|jab)\w*\b.* (?:{NUMBER} times|twice|thrice)\b)"
-    rf".*\b(?:{NUMBER} times|twice|thrice) and \w+"
-)
-"""Something else is counted: "pumps the fist three times and jumps"."""
 MOST_TIMES = 12
-_TRAVELS = re.compile(
-    r"\b(?:forwards?|ahead|back|backwards?|over|across|along|towards?|around|onto|from|to|far|long|left|right|sideways"
-    r"|through|off|down the|up the|(?:run|walk|jog|skip)\w*)\b"
-)
-"""Words of jumps and hops that go somewhere."""
-_ON_ONE_LEG = re.compile(r"\b(?:on|with) (?:(?:the|his|her|their|its|your) )?(?:left|right) (?:foot|leg)\b")
 _SINGLE = {of: of.removesuffix("es" if of == "punches" else "s") for of in get_args(Counted)}
-_AGES = re.compile(rf"\b{NUMBER}[ -]?years?(?:[ -]old)?\b|\bof {NUMBER}\b(?! (?:steps|met))")
-_BODY = re.compile(
-    r"\b(?:arms?|hands?|heads?|legs?|foot|knees?|wrists?|elbows?|hips?|waist|torso|shoulders?"
-    r"|neck|palms?|body|trunk)\b"
-)
-_HELD = re.compile(r"\bwith (?:the |his |her |their |both |your )?(?:arms|hands)\b")
-"""What is held in some way while the whole body turns."""
-_ELSE = re.compile(
-    r"\b(?:stairs?|staircase|ladder|hill|back and forth|to and fro|zig-?zags?|in circles?|in a"
-    r" (?:\w+ )?circle|around|dances?"
-    r"|danc(?:e|ing)|ballet|salsa|waltz(?:es)?|tango|cha-cha|climb(?:s|ing)?|up (?:the |\w+"
-    r" )?steps|down (?:the |\w+ )?steps"
-    r"|in place|on the spot|while|figure (?:of )?(?:eight|8)|pirouette|diagonally|apart|every)\b"
-)
-"""Words with which a number is no plain way: what is done then is left to the network."""
 _TURNS = {"turn", "rotate", "spin", "pivot", "twirl"}
 _PACES = {
     "run": 2.8,
@@ -221,19 +146,19 @@ def read_amount(text: str, *, around: bool = False) -> Amount | None:
     """
     phrase = in_digits(asserted(text))
     verbs = [base for word in re.findall(r"[a-z]+", phrase) if word != "left" and (base := base_of(word))]
-    if _AGES.search(phrase):
-        phrase = _AGES.sub(" ", phrase)
+    if _WORDS["ages"].search(phrase):
+        phrase = _WORDS["ages"].sub(" ", phrase)
     if repetitions := _repetitions(phrase):
         return repetitions
     if not verbs or {kind_of_verb(verb, phrase) for verb in verbs} & {"jump", "fight", "dance"}:
         return None
-    phrase = _STEPS_OFTEN.sub(r"\1 \3 steps\2", phrase)
+    phrase = _WORDS["steps_often"].sub(r"\1 \3 steps\2", phrase)
     return _turn(phrase, verbs, around) or _arc(phrase, verbs) or _steps(phrase, verbs) or _distance(phrase, verbs)
 
 
 def read_seconds(text: str) -> float | None:
     """The seconds that "for ten seconds", "for half a minute" ask for; None without, and beyond a minute."""
-    matches = list(_SECONDS.finditer(in_digits(text)))
+    matches = list(_WORDS["seconds"].finditer(in_digits(text)))
     if len(matches) != 1:
         return None
     seconds = float(matches[0][1]) * (60.0 if matches[0][2].startswith("min") else 1.0)
@@ -246,19 +171,22 @@ def unread_numbers(text: str, amount: Amount | None, seconds: float | None) -> l
     amount, seconds: what was read of it (`read_amount`, `read_seconds`); None for nothing.
     """
     kind, phrase = (amount.kind if amount else ""), in_digits(text)
-    kept = {"m": kind == "way", "d": kind in ("turn", "arc"), "p": kind == "steps", "s": seconds is not None}
-    often = kind in ("count", "steps") or (kind == "turn" and not _DEGREES.search(phrase))
-    kept["t"] = often or head_said(text) is not None
-    kept["v"] = kind in ("way", "arc") and exact_speed(phrase) is not None
-    names = {"deg": "d", "°": "d", "min": "s", "sec": "s", "ste": "p", "pac": "p", "tim": "t", "twi": "t", "thr": "t"}
-    names |= dict.fromkeys(("cm", "m", "met", "cen", "fee", "ft", "foo", "yar"), "m") | {"s": "s", "rep": "t"}
-    names |= dict.fromkeys(("m/s", "km/", "kmh", "kph", "mph"), "v")
-    return [one[0] for one in _QUANTITY.finditer(phrase) if not kept.get(names.get((one[2] or "times")[:3], ""), False)]
+    often = kind in ("count", "steps") or (kind == "turn" and not _WORDS["degrees"].search(phrase))
+    kept = {
+        "length": kind == "way",
+        "angle": kind in ("turn", "arc"),
+        "steps": kind == "steps",
+        "time": seconds is not None,
+        "speed": kind in ("way", "arc") and exact_speed(phrase) is not None,
+        "other": False,
+        "": often or head_said(text) is not None,
+    }
+    return [one[0] for one in _WORDS["quantity"].finditer(phrase) if not kept[one.lastgroup or ""]]
 
 
 def exact_speed(phrase: str) -> float | None:
     """The metres per second that a phrase says in numbers, up to `FASTEST`; None without."""
-    match = _SPEED.search(phrase)
+    match = _WORDS["speed"].search(phrase)
     speed = float(match[1]) * _SPEEDS.get(match[2], 1.0) if match else 0.0
     return speed if 0.1 <= speed <= FASTEST else None
 
@@ -266,7 +194,7 @@ def exact_speed(phrase: str) -> float | None:
 def single_stroke(text: str) -> str:
     """The words of one stroke of what is counted: "a person jumps" of "a person jumps three times"."""
     phrase = in_digits(text, lower=False)
-    less = _OFTEN.sub("", phrase)
+    less = _WORDS["often"].sub("", phrase)
     if less == phrase:
         less = re.sub(rf"\b{NUMBER} (?=(?:[a-z]+ )?[a-z]+)", "", phrase, count=1)
     return " ".join(less.split()).strip(" ,")
@@ -280,8 +208,11 @@ def countable_actions(phrase: str) -> set[Counted]:
 
 def _repetitions(phrase: str) -> Amount | None:
     """Repetitions of one action whose strokes can be counted."""
-    often, many = _OFTEN.findall(_OFTEN_OF_LIMBS.sub(" ", phrase)), list(_MANY.finditer(phrase))
-    if len(often) + len(many) != 1 or _COUNTS_ANOTHER.search(phrase):
+    often, many = (
+        _WORDS["often"].findall(_WORDS["often_of_limbs"].sub(" ", phrase)),
+        list(_WORDS["many"].finditer(phrase)),
+    )
+    if len(often) + len(many) != 1 or _WORDS["counts_another"].search(phrase):
         return None
     kinds = countable_actions(phrase)
     if len(kinds) != 1:
@@ -290,7 +221,7 @@ def _repetitions(phrase: str) -> Amount | None:
     if not 1 <= size <= MOST_TIMES or size != int(size):
         return None
     of = kinds.pop()
-    in_place = of in ("jumps", "hops") and not _TRAVELS.search(_ON_ONE_LEG.sub("", phrase))
+    in_place = of in ("jumps", "hops") and not _WORDS["travels"].search(_WORDS["on_one_leg"].sub("", phrase))
     return Amount("count", size, _side(phrase) or "forward", of=of, in_place=in_place)
 
 
@@ -299,18 +230,22 @@ def _repeat_count(word: str, number: str) -> float:
 
 
 def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
-    if not _TURNS & set(verbs) or _BODY.search(_HELD.sub("", phrase)) or set(verbs) & {"throw", "look"}:
+    if (
+        not _TURNS & set(verbs)
+        or _WORDS["body"].search(_WORDS["held"].sub("", phrase))
+        or set(verbs) & {"throw", "look"}
+    ):
         return None
-    matches, part = list(_DEGREES.finditer(phrase)), _PART_OF_TURN.search(phrase)
-    often = _TURNS_OFTEN.search(phrase) or _OFTEN.search(_OFTEN_OF_LIMBS.sub(" ", phrase))
+    matches, part = list(_WORDS["degrees"].finditer(phrase)), _WORDS["part_of_turn"].search(phrase)
+    often = _WORDS["turns_often"].search(phrase) or _WORDS["often"].search(_WORDS["often_of_limbs"].sub(" ", phrase))
     sizes = len(matches) + bool(part) + bool(often)
-    aside = around and not sizes and _TURNS_ASIDE.search(phrase)
-    if sizes > 1 or not (sizes or aside or (around and _TURNS_ROUND.search(phrase))):
+    aside = around and not sizes and _WORDS["turns_aside"].search(phrase)
+    if sizes > 1 or not (sizes or aside or (around and _WORDS["turns_round"].search(phrase))):
         return None
     if not sizes:
         degrees = 90.0 if aside else 180.0
     elif often:
-        degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _repeat_count(often[1], often[2]))
+        degrees = 360.0 * (float(often[1]) if often.re is _WORDS["turns_often"] else _repeat_count(often[1], often[2]))
     else:
         parts = {"half": 180.0, "0.5": 180.0, "quarter": 90.0, "full": 360.0}
         degrees = float(matches[0][1]) if matches else parts.get(part[1], 270.0)  # type: ignore[index]
@@ -323,20 +258,20 @@ def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
 
 
 def _arc(phrase: str, verbs: list[str]) -> Amount | None:
-    match, side = _ARC.search(phrase) or _CIRCLE.search(phrase), _side(phrase)
-    if match and match.re is _CIRCLE and not (set(verbs) & _RUNS or re.search(r"\b(?:left|right)\b", phrase)):
+    match, side = _WORDS["arc"].search(phrase) or _WORDS["circle"].search(phrase), _side(phrase)
+    if match and match.re is _WORDS["circle"] and not (set(verbs) & _RUNS or re.search(r"\b(?:left|right)\b", phrase)):
         side = side or "left"
-    if not match or not side or not set(verbs) & _GOING or _BODY.search(_HELD.sub("", phrase)):
+    if not match or not side or not set(verbs) & _GOING or _WORDS["body"].search(_WORDS["held"].sub("", phrase)):
         return None
     backward = _is_backward(phrase)
-    size = match[1] if match.re is _ARC else "full"
+    size = match[1] if match.re is _WORDS["arc"] else "full"
     degrees = 90.0 if size == "quarter" else 180.0 if size in ("half", "semi", "0.5") else 360.0
     return Amount("arc", degrees, side, speed=_pace(phrase, verbs), backward=backward)
 
 
 def _steps(phrase: str, verbs: list[str]) -> Amount | None:
-    matches = list(_STEPS.finditer(phrase))
-    if len(matches) != 1 or not set(verbs) & _STEPPING or _ELSE.search(phrase):
+    matches = list(_WORDS["steps"].finditer(phrase))
+    if len(matches) != 1 or not set(verbs) & _STEPPING or _WORDS["else"].search(phrase):
         return None
     size, direction = matches[0][2] or "", _direction(phrase, aside=True)
     count = float(matches[0][1]) if matches[0][1] else 1.0
@@ -352,9 +287,12 @@ def _steps(phrase: str, verbs: list[str]) -> Amount | None:
 
 
 def _distance(phrase: str, verbs: list[str]) -> Amount | None:
-    matches, direction = list(_WAY.finditer(phrase)), _direction(phrase, aside=bool({"move", "step"} & set(verbs)))
+    matches, direction = (
+        list(_WORDS["way"].finditer(phrase)),
+        _direction(phrase, aside=bool({"move", "step"} & set(verbs))),
+    )
     going = [verb for verb in verbs if verb in _GOING]
-    if len(matches) != 1 or direction is None or not going or _ELSE.search(phrase):
+    if len(matches) != 1 or direction is None or not going or _WORDS["else"].search(phrase):
         return None
     if set(verbs) - set(going) - {"stop", "halt", "track", "return", "keep", "continue"} - {"open", "place"}:
         return None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
-from motionloom.goals.verbs import asserted, base_of, in_plainer_words, kind_of_verb
+from motionloom.goals.verbs import asserted, base_of, in_plainer_words, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Side, count
 from motionloom.kinematics.gestures import (
     foot_lifts,
@@ -42,6 +42,8 @@ from motionloom.kinematics.physics import (
 from motionloom.kinematics.stairs import floating
 from motionloom.motion import heading
 
+_WORDS = word_patterns("expected")
+
 Check = Callable[[Array, float], bool]
 """(positions (frames, 22, 3) metres, frames per second) to whether something is done."""
 _GOES, _PACE, _FAR = 0.6, 0.25, 1.25
@@ -66,58 +68,8 @@ _LEAPS, _CHAIR = 0.2, 0.45
 """Metres that the pelvis of who falls rises by at most, and that the feet are over the floor of who lies."""
 _CROSSED = 0.27
 """Metres from a wrist to the other arm's elbow of who has crossed the arms."""
-_CLIMB = re.compile(
-    r"\b(?:(?:up|down)?stairs?|stairway|staircase|ladder|climb\w*|(?:up|down) (?:the|some|a few|a flight of) steps"
-    r"|(?:up|down|on|onto|over|off|from) (?:an?|the) (?:\w+ )?(?:box|platform|ledge|wall|fence|rope|bars?|tree|hill"
-    r"|ramp|slope|mountain|rock|table|trampoline|horse|bike|bicycle)|swim\w*|fl(?:y|ies|ying)|pull-?ups?|hang(?:s|ing)?)\b"
-)
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
-_GAIT = (
-    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|step"
-    r"|stumbl|creep|prowl|plod|strut|stomp|patrol|stagger|lurch|wander|trudg|pranc)"
-    r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b|\bpac(?:es|ing|ed)\b|^pace\b"
-)
-_BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing) (?:up|away)|few steps back)\b|^back (?:up|away)\b"
-_IN_PLACE = (
-    r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)"
-    r"|(?:jump|hop|bounc)\w* up and down)\b"
-)
-_STAYS_THERE = r"\b(?:roll|swing|slip|stretch)\w*\b.*\b(?:shoulder|arm|leg|head|backward)|\btoes\b"
-"""What is done backwards on the spot."""
-_WAY_BACK = (
-    r"\b(?:walks? back|walking back|comes? back|returns?)"
-    r"(?= *$|,| again\b| to (?:the start|where|(?:his|her|their) place))"
-)
-_NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
-_THROWS = (
-    r"\b(?:throw|toss|hurl|pitch|lob|chuck)\w* (?:\w+ ){0,4}(?:balls?|stones?|rocks?|spear|javelin|snowballs?|frisbee"
-    r"|disc(?:us)?|bottles?|grenades?|kni(?:fe|ves)|darts?|axe|bricks?|objects?|it|them|something|stick|boomerang|paper|overhand|underhand)\b"
-)
-"""Objects of throws: a tantrum is none."""
-_TUMBLES = (
-    r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
-    r"|rolls? (?:forwards?|backwards?)|(?:forward|backward|shoulder) roll)"
-)
-_SEAT = r"\b(?:chair|seat|bench|stool|sofa|couch)\b"
-_FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
-_SIDE_BEND = (
-    r"\b(?:lean|bend|tilt)(?:s|ing|ed)? (?:\w+ )?(?:sideways )?(?:over )?to(?:wards?)? "
-    r"(?<!head to )(?:the|his|her|their|its|your|my) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
-)
-_STANDS = (
-    r"\b(?:rais|lift|wav|clap|point|nod|salut|cheer|drink|eat|look|cross|fold|stretch|shrug|talk|gestur|beckon|yawn|laugh"
-    r"|cry|cries|smil|sing|shout|scratch|hold|knock|brush)(?:e?s|ed|ing|ging|ding|ping)?\b"
-)
-_NOT_STANDING = (
-    r"\b(?:sit|seat|lie|lay|kneel|knelt|crouch|squat|floor|ground|bed|chair|knee|bend|bent|lean|stair|ladder|walk|leg|foot|feet"
-    r"|toe|step|circle|it\b|box|heavy|weight|barbell|dumbbell|forward|back|shoe|tired|exhaust|horse|baby|plank|push-?up)"
-)
-"""Gestures of who stands, and words of somebody who may do something else."""
-_FALLS = (
-    r"\b(?:falls?|falling|fell|collapses?|collapsing)\b"
-    r"(?! (?:asleep|behind|back|in love|in line|into|silent|ill|apart|short|out|for|off)\b)"
-)
 _DET = r"(?:the|his|her|their|its|your|my)"
 _FALL = r"\b(?:falls?|falling|fell|collapses?|collapsing)(?: \w+ly)?(?: down| over)? (?:\w+ly )?"
 _FALL_WAYS = {
@@ -129,8 +81,6 @@ _FALL_WAYS = {
 _FALL_NAMES = {(-1, 0): "backwards", (1, 0): "forwards", (0, 1): "to the left", (0, -1): "to the right"}
 _TIPS = 0.1
 """Metres of the neck beyond the feet, on the average of half a second, of who falls to a side."""
-_ARMS_OUT = r"\barms (?:\w+ )?(?:out\b|spread|outstretched|stretched)(?! (?:of|up|over|above))"
-_LEVEL = r"\b(?:shoulders?|chest|t-?pose|sides?|sideways|out|front)\b"
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
 
 
@@ -193,7 +143,7 @@ def missing(text: str, positions: np.ndarray, fps: float) -> list[str]:
 
 def climbs(texts: Iterable[str]) -> bool:
     """Whether some words are of stairs, of a ladder, of climbing, or of something that people are on or hang from."""
-    return any(_CLIMB.search(text.lower()) for text in texts)
+    return any(_WORDS["climb"].search(text.lower()) for text in texts)
 
 
 def asks_for_rest(text: str) -> bool:
@@ -240,10 +190,13 @@ def _repeated(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
 
 
 def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
-    sign, turns = (1 if side == "left" else -1), phrase.has(r"\b(?:turn|pivot|rotat)") and not phrase.has(_NO_TURN)
+    sign, turns = (
+        (1 if side == "left" else -1),
+        phrase.has(r"\b(?:turn|pivot|rotat)") and not phrase.has(_WORDS["no_turn"]),
+    )
     if phrase.has(r"\bturn\w* (?:\w+ )?head\b"):
         return
-    if phrase.has(_NO_TURN):
+    if phrase.has(_WORDS["no_turn"]):
         yield "facing one way", lambda p, fps: abs(turn(p)) < _FACES
     if phrase.has(r"\b(?:spin|twirl|pirouet)"):
         yield "a full turn", lambda p, fps: float(np.abs(np.diff(smooth(heading(p), 3))).sum()) > _SPINS
@@ -256,9 +209,9 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
         yield "a half turn", lambda p, fps: _TURNS_ROUND[0] < abs(turn(p)) < _TURNS_ROUND[1]
     elif turns and phrase.has(r"\baway\b"):
         yield "a turn", lambda p, fps: abs(turn(p)) > 2 * _TURNS
-    if phrase.has(_IN_PLACE):
+    if phrase.has(_WORDS["in_place"]):
         yield "staying in place", lambda p, fps: float(np.hypot(*_from_start(p).max(axis=0))) < 2 * _GOES
-    elif phrase.has(_WAY_BACK) and not phrase.has(_BACKWARDS):
+    elif phrase.has(_WORDS["way_back"]) and not phrase.has(_WORDS["backwards"]):
         yield (
             "coming back to the start",
             lambda p, fps: float(np.linalg.norm(p[-1, 0, [0, 2]] - p[0, 0, [0, 2]])) < travel(p, fps) / 2,
@@ -269,23 +222,23 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
             ("a way down" if falls else "a way up"),
             lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > _FLIGHT,
         )
-    elif _travels(phrase) and not turns and not phrase.has(_FALLS):
+    elif _travels(phrase) and not turns and not phrase.has(_WORDS["falls"]):
         yield _direction(phrase, side, sign)
-    if phrase.has(_GAIT, r"\bin an? (?:[\w-]+ ){0,2}circle\b"):
+    if phrase.has(_WORDS["gait"], r"\bin an? (?:[\w-]+ ){0,2}circle\b"):
         yield "a circle", lambda p, fps: abs(turn(p)) > _CIRCLES and (not side or sign * turn(p) > 0)
-    if side and phrase.has(_GAIT) and phrase.has(r"\b(?:curv|veer|arc)"):
+    if side and phrase.has(_WORDS["gait"]) and phrase.has(r"\b(?:curv|veer|arc)"):
         yield f"a curve to the {side}", lambda p, fps: sign * turn(p) > _CURVES
-    if side and phrase.has(_GAIT, r"\bdiagonal"):
+    if side and phrase.has(_WORDS["gait"], r"\bdiagonal"):
         yield f"a way aside to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES / 2
     yield from _paces(phrase)
 
 
 def _travels(phrase: _Phrase) -> bool:
-    return phrase.has(_GAIT) or (phrase.has(_BACKWARDS) and not phrase.has(_STAYS_THERE))
+    return phrase.has(_WORDS["gait"]) or (phrase.has(_WORDS["backwards"]) and not phrase.has(_WORDS["stays_there"]))
 
 
 def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
-    if phrase.has(_BACKWARDS):
+    if phrase.has(_WORDS["backwards"]):
         return "a way backwards", lambda p, fps: displacement(p, fps).forward < -_GOES
     if side and phrase.has(r"\b(?:side|strafe|shuffl|over to the (?:left|right))"):
         return f"a way to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES
@@ -300,7 +253,9 @@ def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
 
 def _paces(phrase: _Phrase) -> Iterator[_Named]:
     walks = phrase.has(r"\b(?:walk|stroll|stride)")
-    runs = phrase.has(r"\b(?:run|runs|running|sprint\w*)\b(?!-up)") and not phrase.has(f"{_BACKWARDS}|{_IN_PLACE}")
+    runs = phrase.has(r"\b(?:run|runs|running|sprint\w*)\b(?!-up)") and not (
+        phrase.has(_WORDS["backwards"]) or phrase.has(_WORDS["in_place"])
+    )
     if runs and not walks:
         yield "a run", lambda p, fps: float(speed(p, fps).max()) > _RUNS
     elif walks and phrase.has(r"\b(?:fast|quick|brisk|hurr|rush|swift)"):
@@ -313,11 +268,11 @@ def _paces(phrase: _Phrase) -> Iterator[_Named]:
 
 def _postures(phrase: _Phrase) -> Iterator[_Named]:
     sits = phrase.has(r"\b(?:sit|sits|sitting|sat|takes? a seat|taking a seat)\b(?!-| ups?\b)")
-    if sits and phrase.has(_FLOOR) and not phrase.has(_SEAT):
+    if sits and phrase.has(_WORDS["floor"]) and not phrase.has(_WORDS["seat"]):
         yield "sitting on the floor", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & _upright(p), 1.0, fps)
     elif sits:
         yield "sitting", lambda p, fps: bool(seats(p, fps, shortest=0.5))
-    elif phrase.has(r"\b(?:gets?|stands?|rises?|rising|getting) .*\b(?:from|out of|off)\b", _SEAT):
+    elif phrase.has(r"\b(?:gets?|stands?|rises?|rising|getting) .*\b(?:from|out of|off)\b", _WORDS["seat"]):
         yield "sitting at the start", lambda p, fps: any(one.begin < 1 for one in seats(p, fps, shortest=0.25))
     if phrase.has(r"\b(?:lie|lies|lying)\b|\blay(?:s|ing)? down\b") and not phrase.has(
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
@@ -347,7 +302,7 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         r"rais|lift|\bup\b|over (?:\w+ )?head",
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
-        joint = "spine3" if phrase.has(_LEVEL) else "neck"
+        joint = "spine3" if phrase.has(_WORDS["level"]) else "neck"
         yield (
             "a raised arm",
             lambda p, fps: (
@@ -357,7 +312,7 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         )
     if phrase.has(r"\b(?:lower|drop)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b"):
         yield "a lowered arm", lambda p, fps: float(hands_height(p[-1:], over="pelvis")[:, list(hands)].max()) < _HANGS
-    if phrase.has(_ARMS_OUT):
+    if phrase.has(_WORDS["arms_out"]):
         yield "arms out", lambda p, fps: _lasts(_arms_out(p), 0.4 * len(p) / fps, fps)
     if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:(?!to )\w+ ){0,2}knees?\b"):
         yield "a raised knee", lambda p, fps: any(_lasts(_knees(p)[:, hand] > -_KNEE, 0.2, fps) for hand in hands)
@@ -373,7 +328,7 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a hand at the head", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(r"\bhands? on (?:the |his |her |their |its |your |my )?(?:hips|waist)\b"):
         yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
-    if phrase.has(_THROWS):
+    if phrase.has(_WORDS["throws"]):
         yield "a throw", lambda p, fps: _throws(_wrist_speed(p, fps).max(axis=0), hands)
     if phrase.has(r"(?<!\ba )(?<!\bthe )(?<!\bhis )(?<!\bher )\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
@@ -389,15 +344,13 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
 
 
 def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
-    if phrase.has(_TUMBLES):
+    if phrase.has(_WORDS["tumbles"]):
         yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
-    if phrase.has(_STANDS) and phrase.kinds <= {"gesture", "state"} and not phrase.has(_NOT_STANDING):
-        yield "standing upright", _is_upright
     if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
     if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b|\bhands on (?:\w+ )?knees\b"):
         yield "a bend", lambda p, fps: _lasts(torso_inclination(p) > _BENDS, 0.2, fps)
-    if bent := re.search(_SIDE_BEND, phrase.text):
+    if bent := re.search(_WORDS["side_bend"], phrase.text):
         sign = 1 if bent[1] == "left" else -1
         yield f"a lean to the {bent[1]}", lambda p, fps: _lasts(sign * _sideways(p) > _LEANS, 0.3, fps)
     if phrase.has(r"\bcrawl|\ball fours\b"):
@@ -408,7 +361,7 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
     if (aside := re.search(rf"\brolls? (?:over )?(?:on {_DET} \w+ )?to {_DET} (left|right)", phrase.text)) is not None:
         sign = 1 if aside[1] == "left" else -1
         yield f"a roll to the {aside[1]}", lambda p, fps: sign * _log_roll(p) > np.pi / 2
-    if phrase.has(_FALLS):
+    if phrase.has(_WORDS["falls"]):
         leaps = phrase.has(r"\b(?:jump|leap|flip|div|somersault)")
         for name, (ahead, left) in _FALL_WAYS.items():
             if phrase.has(name):
@@ -432,13 +385,6 @@ def _sideways(p: Array) -> Array:
     """(frames,) radians by which the line from the pelvis to the neck is inclined to the body's left."""
     trunk = in_body(p)[:, J["neck"]] - in_body(p)[:, 0]
     return np.arctan2(trunk[:, 0], trunk[:, 1])
-
-
-def _is_upright(p: Array, fps: float) -> bool:
-    """Whether somebody stands upright in one place: (frames, 22, 3) metres."""
-    upright = float(np.median(torso_inclination(p))) < _UPRIGHT / 2 and float(pelvis_height(p).min()) > _LOW - 0.05
-    leaps = float(p[:, 0, 1].max() - np.median(p[: max(1, round(fps / 4)), 0, 1])) > _LEAPS
-    return upright and not leaps and float(np.hypot(*_from_start(p).T).max()) < 1.0
 
 
 def _falls_as_people(p: Array, fps: float) -> bool:

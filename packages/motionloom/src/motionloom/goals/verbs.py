@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from motionloom.goals.numerals import NUMBER
 from motionloom.reading import read_table
 
 _TABLES: dict[str, Any] = read_table("motionloom.goals", "verbs.toml")
@@ -130,6 +131,7 @@ _DETERMINERS = (
     r"(?:the|an?|his|her|their|its|your|my|some|both|this|that|these|those|another|every|it|them|him|me|us|you"
     r"|something|somebody|someone)(?! (?:and|then|again|slowly|quickly)\b)"
 )
+_HIS = r"(?:the|his|her|their|its|your|my)"
 _SIZES = (
     r"(?:\w+ )?(?:(?:\w+[ -])?(?:turns?|circles?|spins?|rolls?|laps?)|half|quarter|full|complete|three[ -]quarter"
     r"|couple|few|bit|little|while|moments?|seconds?|minutes?|whole|entire|body|times?|\d+|miles?|marathon|races?|way|course"
@@ -149,6 +151,14 @@ def _barred() -> Iterator[re.Pattern[str]]:
 
 
 _BARRED = tuple(_barred())
+
+
+def word_patterns(part: str) -> dict[str, re.Pattern[str]]:
+    """The patterns of one module in ``verbs.toml``, by name."""
+    patterns = _TABLES["patterns"][part].items()
+    return {
+        name: re.compile(one.replace("<his>", _HIS).replace("<n>", NUMBER), re.IGNORECASE) for name, one in patterns
+    }
 
 
 @lru_cache(4096)
