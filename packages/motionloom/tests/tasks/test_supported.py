@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from motionloom import rotations as rot
+from motionloom.goals.expected import climbs
 from motionloom.kinematics.physics import WRISTS, J
 from motionloom.kinematics.stairs import falls_from_above, hovering, stairs
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated
+from motionloom.tasks.supported import add_support, add_support_between, is_elevated
 
 FPS = 20.0
 

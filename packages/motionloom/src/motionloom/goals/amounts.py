@@ -94,12 +94,6 @@ _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
 _SPEEDS = {"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.447}
 FASTEST = 8.0
 """m/s that words may say; beyond it the number is left."""
-REPEATED = (
-    r"squats|jumps|kicks|punches|(?:push|sit|pull)-?ups|(?:jumping )?jacks|lunges|burpees|crunches|claps|nods|bows|hops"
-    r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches|jabs|swings|throws|leaps"
-    r"|knocks|strikes|sets|bends|dips|twirls"
-)
-"""What is done as often as a number before it says."""
 _COUNTED: tuple[tuple[str, Counted], ...] = (
     (r"jumping[ -]?jacks?|star jumps?", "jumping jacks"),
     (r"jump\w*|leaps?|leaping", "jumps"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
-from motionloom.goals.verbs import asserted, base_of, in_plainer_words, kind_of_verb, word_patterns
+from motionloom.goals.verbs import FALL_WAYS, asserted, base_of, in_plainer_words, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Side, count
 from motionloom.kinematics.gestures import (
     foot_lifts,
@@ -71,14 +71,6 @@ _CROSSED = 0.27
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
 _DET = r"(?:the|his|her|their|its|your|my)"
-_FALL = r"\b(?:falls?|falling|fell|collapses?|collapsing)(?: \w+ly)?(?: down| over)? (?:\w+ly )?"
-_FALL_WAYS = {
-    rf"{_FALL}(?:backwards?\b|(?:flat )?on(?:to)? {_DET} (?:back|butt|bottom|backside)\b)": (-1, 0),
-    rf"{_FALL}(?:forwards?\b|face[ -](?:down|first)|(?:flat )?on(?:to)? {_DET} (?:face|belly|stomach|knees)\b)": (1, 0),
-    rf"{_FALL}(?:sideways )?to(?:wards?)? {_DET} left\b": (0, 1),
-    rf"{_FALL}(?:sideways )?to(?:wards?)? {_DET} right\b": (0, -1),
-}
-_FALL_NAMES = {(-1, 0): "backwards", (1, 0): "forwards", (0, 1): "to the left", (0, -1): "to the right"}
 _TIPS = 0.1
 """Metres of the neck beyond the feet, on the average of half a second, of who falls to a side."""
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
@@ -363,9 +355,9 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
         yield f"a roll to the {aside[1]}", lambda p, fps: sign * _log_roll(p) > np.pi / 2
     if phrase.has(_WORDS["falls"]):
         leaps = phrase.has(r"\b(?:jump|leap|flip|div|somersault)")
-        for name, (ahead, left) in _FALL_WAYS.items():
-            if phrase.has(name):
-                yield f"a fall {_FALL_NAMES[ahead, left]}", lambda p, fps, to=(ahead, left): _falls_to(p, fps, to)  # type: ignore[misc]
+        for name, (words, to) in FALL_WAYS.items():
+            if words.search(phrase.text):
+                yield f"a fall {name.replace('_', ' ')}", lambda p, fps, to=to: _falls_to(p, fps, to)  # type: ignore[misc]
         yield "a fall", lambda p, fps: _lasts(_over_floor(p) < _DOWN, 0.25, fps) and (leaps or _falls_as_people(p, fps))
 
 

@@ -1,12 +1,10 @@
 """Verbs in the words of prompts: their forms, what kind of action each names, who does it, and what they deny."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from motionloom.goals.numerals import NUMBER
 from motionloom.reading import read_table
 
 _TABLES: dict[str, Any] = read_table("motionloom.goals", "verbs.toml")
@@ -127,38 +125,25 @@ def kind_of_verb(word: str, phrase: str) -> str:
     return _KINDS.get(base, "other")
 
 
-_DETERMINERS = (
-    r"(?:the|an?|his|her|their|its|your|my|some|both|this|that|these|those|another|every|it|them|him|me|us|you"
-    r"|something|somebody|someone)(?! (?:and|then|again|slowly|quickly)\b)"
-)
-_HIS = r"(?:the|his|her|their|its|your|my)"
-_SIZES = (
-    r"(?:\w+ )?(?:(?:\w+[ -])?(?:turns?|circles?|spins?|rolls?|laps?)|half|quarter|full|complete|three[ -]quarter"
-    r"|couple|few|bit|little|while|moments?|seconds?|minutes?|whole|entire|body|times?|\d+|miles?|marathon|races?|way|course"
-    r"|distance|length|block|steps?|stairs|met(?:er|re)s?|hurdles?)\b"
-)
+_DETERMINERS, _SIZES = _TABLES["places"]["<det>"], _TABLES["places"]["<size>"]
 
 
-def _barred() -> Iterator[re.Pattern[str]]:
-    """The patterns of `asserted`."""
+def words_pattern(pattern: str) -> re.Pattern[str]:
+    """A pattern of ``verbs.toml`` with what stands for words in it, in any case of letters."""
     gerunds = "|".join(sorted(MOODS["gerund"], key=len, reverse=True))
-    places = {"<det>": _DETERMINERS, "<gerund>": f"(?:{gerunds})", "<size>": _SIZES}
-    places["<rest>"] = r"(?:(?! but | then )[^,;.])*"
-    for pattern in (one for group in _TABLES["barred"].values() for one in group):
-        for name, words in places.items():
-            pattern = pattern.replace(name, words)
-        yield re.compile(pattern)
-
-
-_BARRED = tuple(_barred())
+    for name, words in (_TABLES["places"] | {"<gerund>": f"(?:{gerunds})"}).items():
+        pattern = pattern.replace(name, words)
+    return re.compile(pattern, re.IGNORECASE)
 
 
 def word_patterns(part: str) -> dict[str, re.Pattern[str]]:
     """The patterns of one module in ``verbs.toml``, by name."""
-    patterns = _TABLES["patterns"][part].items()
-    return {
-        name: re.compile(one.replace("<his>", _HIS).replace("<n>", NUMBER), re.IGNORECASE) for name, one in patterns
-    }
+    return {name: words_pattern(pattern) for name, pattern in _TABLES["patterns"][part].items()}
+
+
+_BARRED = tuple(words_pattern(pattern) for group in _TABLES["barred"].values() for pattern in group)
+FALL_WAYS = {name: (words_pattern(way[0]), (way[1], way[2])) for name, way in _TABLES["fall_ways"].items()}
+"""Ways of falling, each with its words, and how far ahead and to the left the neck goes."""
 
 
 @lru_cache(4096)

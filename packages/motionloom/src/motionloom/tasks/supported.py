@@ -35,7 +35,7 @@ def add_support(motion: Motion, *, stairs: bool = True) -> Motion:
     """
     places = motion.positions()
     if hovering(places, motion.fps) or falls_from_above(places, motion.fps):
-        motion = _grounded(motion, places)
+        motion = _dropped(motion, np.maximum(places[..., 1].min(axis=1), 0.0))
     elif stairs:
         motion = _on_stairs(motion, places)
     else:
@@ -67,10 +67,7 @@ def lowered(motion: Motion) -> Motion:
     drop = np.zeros(len(motion))
     for first, end in floating(motion.positions(), motion.fps):
         drop[first:end] = lowest[first:end]
-    if not drop.any():
-        return motion
-    drop = np.minimum(smooth(drop, odd(motion.fps / 4)), np.maximum(lowest, 0.0))
-    return clean_feet(replace(motion, root=motion.root - drop[:, None] * np.array([0.0, 1.0, 0.0])))
+    return _dropped(motion, drop) if drop.any() else motion
 
 
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
@@ -90,7 +87,8 @@ def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
     return fit(replace(motion, root=motion.root + lift[:, None] * np.array([0.0, 1.0, 0.0])), goal)
 
 
-def _grounded(motion: Motion, places: np.ndarray) -> Motion:
-    """Lowered by as much as the lowest joint is above the floor, a quarter of a second averaged."""
-    drop = smooth(np.maximum(places[..., 1].min(axis=1), 0.0), odd(motion.fps / 4))
+def _dropped(motion: Motion, drop: np.ndarray) -> Motion:
+    """Lowered by metres (frames,), a quarter of a second averaged, and not into the floor."""
+    lowest = motion.positions()[..., 1].min(axis=1)
+    drop = np.minimum(smooth(drop, odd(motion.fps / 4)), np.maximum(lowest, 0.0))
     return clean_feet(replace(motion, root=motion.root - drop[:, None] * np.array([0.0, 1.0, 0.0])))

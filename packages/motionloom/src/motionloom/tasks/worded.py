@@ -263,30 +263,24 @@ def generate_timelines(
                 some = several[begin : begin + _TOGETHER]
                 own = seeds[done : done + len(some)]
                 best = _best_attempts(prior, some, seeds=own, sampling=sampling, progress=progress, **how)
-                yield from (_with_heads(_on_the_floor(one)) if foot_lock else _with_heads(one) for one in best)
+                yield from (_finished(one, foot_lock) for one in best)
                 done += len(some)
             continue
         for one in several:
             best_try = _best_try(prior, one, sampling=replace(sampling, count=1), seed=seeds[done], **how)
-            yield _with_heads(_on_the_floor(best_try) if foot_lock else best_try)
+            yield _finished(best_try, foot_lock)
             done += 1
             if progress:
                 progress(done, len(timelines))
 
 
-def _on_the_floor(one: Worded) -> Worded:
-    """The motion with whoever floats on the floor, unless the words are of climbing (`supported.lowered`)."""
-    motion = one.motion if climbs(part.text for part in one.timeline.segments) else lowered(one.motion)
-    return one if motion is one.motion else replace(one, motion=motion)
-
-
-def _with_heads(one: Worded) -> Worded:
-    """The motion with a head that does what the words of each segment say of it, where words are looked for at all."""
-    if one.attempts == 1:
-        return one
-    motion = one.motion
-    for segment, (first, last) in zip(one.timeline.segments, pairwise(one.timeline.begins), strict=True):
-        if move := head_said(segment.text):
+def _finished(one: Worded, foot_lock: bool) -> Worded:
+    """The motion with whoever floats on the floor, unless the words climb, and with a head that does what the words
+    of each segment say of it, where words are looked for at all."""
+    segments = one.timeline.segments
+    motion = lowered(one.motion) if foot_lock and not climbs(part.text for part in segments) else one.motion
+    for segment, (first, last) in zip(segments, pairwise(one.timeline.begins), strict=True):
+        if one.attempts > 1 and (move := head_said(segment.text)):
             motion = Nod(((first / FPS, last / FPS),), move=move).apply(None, motion, 0)
     return one if motion is one.motion else replace(one, motion=motion)
 
