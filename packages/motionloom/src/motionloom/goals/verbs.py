@@ -142,6 +142,7 @@ def word_patterns(part: str) -> dict[str, re.Pattern[str]]:
 
 
 _BARRED = tuple(words_pattern(pattern) for group in _TABLES["barred"].values() for pattern in group)
+_CLAUSES = [words_pattern(pattern) for pattern in _TABLES["barred"]["clauses"]]
 FALL_WAYS = {name: (words_pattern(way[0]), (way[1], way[2])) for name, way in _TABLES["fall_ways"].items()}
 """Ways of falling, each with its words, and how far ahead and to the left the neck goes."""
 
@@ -236,8 +237,10 @@ def in_plainer_words(text: str) -> str:
     form only where a sentence begins with it or behind "to". Words of which a part is not `asserted`, and verbs with an
     object, stay as they are.
     """
+    end = min((match.start() for one in _CLAUSES if (match := one.search(text))), default=len(text))
+    text, behind = text[:end], text[end:]
     if asserted(text) != " ".join(text.lower().split()):
-        return text
+        return text + behind
 
     def common(match: re.Match[str]) -> str:
         word = match[0]
@@ -259,4 +262,4 @@ def in_plainer_words(text: str) -> str:
 
     for phrase in PHRASES:
         text = phrase.replaced(text)
-    return re.sub(r"[A-Za-z]+", common, text)
+    return re.sub(r"[A-Za-z]+", common, text) + behind

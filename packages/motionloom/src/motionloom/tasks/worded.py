@@ -131,7 +131,8 @@ class Worded:
         end where nothing happens."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
         looked = self.attempts > 1 and self.missing
-        unseen = clipped(f"not shown in {self.attempts} attempts: {', '.join(self.missing)}") if looked else ""
+        names = ", ".join(dict.fromkeys(self.missing))
+        unseen = clipped(f"not shown in {self.attempts} attempts: {names}") if looked else ""
         problems = [amount.problem for amount in self.amounts]
         return [*filter(None, [self.replaced, *problems, unseen, self.stillness(of=share)])]
 
