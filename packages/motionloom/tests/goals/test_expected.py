@@ -170,7 +170,7 @@ def rising(p: np.ndarray, metres: float) -> np.ndarray:
         ("he falls sideways to the right", falling(-90), falling(90)),
         ("a gymnast does a forward roll", rolling(1, 0), rolling(-1, 0)),
         ("she rolls backwards", rolling(-1, 0), rolling(1, 0)),
-        ("he rolls on his back to the left", rolling(0.5, 1), rolling(-0.5, 1)),
+        ("he rolls on the floor to the left", rolling(0.5, 1), rolling(-0.5, 1)),
         ("he walks with his arms out", with_arms_out(), walking(1.2)),
         ("she lowers the left arm", raising(1), raising(0)),
         ("he raises both arms to shoulder height", at_shoulders(), standing()),
@@ -228,6 +228,6 @@ def test_a_side_of_limbs_is_no_way() -> None:
 
 
 def test_names_read_as_a_list() -> None:
-    """They are printed: "not found in 4 attempts: a turn to the left"."""
+    """They are printed: "not shown in 4 attempts: a turn to the left"."""
     assert missing("a person turns left", turning(-80), FPS) == ["a turn to the left"]
     assert missing("a person walks forward, slowly", standing(), FPS) == ["a way forward"]

@@ -324,8 +324,7 @@ def _remarks(measures: Sequence[dict[str, float]]) -> list[str]:
     """A sentence for each duet whose bodies are in each other."""
     return [
         f"{f'duet {number}: ' if len(measures) > 1 else ''}the two bodies overlap by up to "
-        f"{100 * one['deepest_overlap']:.0f} cm in {one['overlapping_frames']} frame"
-        f"{'s' if one['overlapping_frames'] > 1 else ''}"
+        f"{100 * one['deepest_overlap']:.0f} cm; frames: {one['overlapping_frames']}"
         for number, one in enumerate(measures, 1)
         if one["overlapping_frames"]
     ]

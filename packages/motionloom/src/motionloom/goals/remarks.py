@@ -43,7 +43,7 @@ def numbers_read(timeline: Timeline) -> str:
         for one in timeline.readings
     ]
     kept = [f"read as: {'; '.join(readings)}"] if readings else []
-    return clipped("; ".join(kept + [f"not kept: {', '.join(timeline.unread)}"] * bool(timeline.unread)))
+    return clipped("; ".join(kept + [f"not kept: {', '.join(timeline.unread)}"] * bool(timeline.unread)), LINE - 24)
 
 
 def parts_read(timeline: Timeline) -> str:
@@ -54,12 +54,12 @@ def parts_read(timeline: Timeline) -> str:
         return ""
     subject = subject_of(timeline.segments[0].text)
     listed = ", ".join(f"{one.text.removeprefix(subject).strip()} {one.seconds:.1f} s" for one in timeline.segments)
-    return clipped(f"one after the other: {listed}")
+    return clipped(f"one after the other: {listed}", LINE - 24)
 
 
-def clipped(line: str) -> str:
-    """The line, or as much of it as `LINE` characters hold."""
-    return line if len(line) <= LINE else f"{line[: LINE - 4].rsplit(' ', 1)[0]} ..."
+def clipped(line: str, most: int = LINE) -> str:
+    """The line, or as much of it as that many characters hold."""
+    return line if len(line) <= most else f"{line[: most - 4].rsplit(' ', 1)[0]} ..."
 
 
 def remarks_on_two(
