@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from motionloom import rotations as rot
-from motionloom.goals.expected import climbs
+from motionloom.goals.expected import climbs, floating
 from motionloom.kinematics.physics import WRISTS, J
-from motionloom.kinematics.stairs import falls_from_above, floating, hovering, stairs
+from motionloom.kinematics.stairs import falls_from_above, hovering, stairs
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.supported import add_support, add_support_between, is_elevated

@@ -15,7 +15,7 @@ from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.heads import head_said
 from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.paths import check_speed
-from motionloom.goals.verbs import asserted, base_of, kind_of_verb, word_patterns
+from motionloom.goals.verbs import TABLES, asserted, base_of, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Counted, Side, count, foot_moves
 from motionloom.motion import ground_pose
 
@@ -94,37 +94,11 @@ _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
 _SPEEDS = {"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.447}
 FASTEST = 8.0
 """m/s that words may say; beyond it the number is left."""
-_COUNTED: tuple[tuple[str, Counted], ...] = (
-    (r"jumping[ -]?jacks?|star jumps?", "jumping jacks"),
-    (r"jump\w*|leaps?|leaping", "jumps"),
-    (r"hops?|hopping|hopped", "hops"),
-    (r"squat\w*", "squats"),
-    (r"(?<!butt )kicks?|kicking|kicked", "kicks"),
-    (r"punch\w*|jabs?|jabbing|strikes? with (?:the|his|her) fist", "punches"),
-    (r"(?<!a )bow(?:s|ing|ed)?(?! tie)", "bows"),
-    (r"claps?|clapping|clapped", "claps"),
-)
+_COUNTED: tuple[tuple[str, Counted], ...] = tuple((row[0], what) for what, row in TABLES["counted"].items())
 MOST_TIMES = 12
 _SINGLE = {of: of.removesuffix("es" if of == "punches" else "s") for of in get_args(Counted)}
 _TURNS = {"turn", "rotate", "spin", "pivot", "twirl"}
-_PACES = {
-    "run": 2.8,
-    "jog": 2.2,
-    "sprint": 4.5,
-    "rush": 2.5,
-    "race": 4.0,
-    "march": 1.3,
-    "crawl": 0.45,
-    "sneak": 0.6,
-    "creep": 0.5,
-    "tiptoe": 0.6,
-    "limp": 0.6,
-    "shuffle": 0.5,
-    "stagger": 0.7,
-    "stumble": 0.8,
-    "sidestep": 0.6,
-    "skip": 1.6,
-}
+_PACES: dict[str, float] = TABLES["paces"]
 _RUNS = {"run", "jog", "sprint", "race"}
 """Who does so leans far into a circle of `RADIUS`, which is run only where a side is said."""
 _WALKING = 1.1
@@ -357,16 +331,7 @@ SLOWEST = 0.5
 """Share of the pace of the words that a way may be slowed to for a longer time; beyond it the person stands still."""
 TURN_OFF, WAY_OFF = 10.0, 0.1
 """Degrees (10 of a full turn), and share of a way, by which a motion may miss what was read."""
-STROKES: dict[Counted, float] = {
-    "jumps": 1.5,
-    "hops": 0.9,
-    "squats": 2.2,
-    "kicks": 1.8,
-    "punches": 1.6,
-    "bows": 2.5,
-    "claps": 0.5,
-    "jumping jacks": 1.0,
-}
+STROKES: dict[Counted, float] = {what: row[1] for what, row in TABLES["counted"].items()}
 """Seconds of one stroke; how often they come is measured, and tried again (`motionloom.tasks.worded`)."""
 CHAINED = 1.4
 """Seconds from which on a stroke is a segment of its own; quicker ones follow each other in one."""

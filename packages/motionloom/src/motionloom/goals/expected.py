@@ -24,6 +24,7 @@ from motionloom.kinematics.gestures import (
     seats,
     single_foot_hops,
     torso_inclination,
+    true_spans,
     wrist_swings,
 )
 from motionloom.kinematics.physics import (
@@ -39,7 +40,7 @@ from motionloom.kinematics.physics import (
     travel,
     turn,
 )
-from motionloom.kinematics.stairs import floating
+from motionloom.kinematics.stairs import FLIGHT
 from motionloom.motion import heading
 
 _WORDS = word_patterns("expected")
@@ -68,6 +69,7 @@ _LEAPS, _CHAIR = 0.2, 0.45
 """Metres that the pelvis of who falls rises by at most, and that the feet are over the floor of who lies."""
 _CROSSED = 0.27
 """Metres from a wrist to the other arm's elbow of who has crossed the arms."""
+_FLOATS = 0.1
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
 _DET = r"(?:the|his|her|their|its|your|my)"
@@ -131,6 +133,14 @@ def missing(text: str, positions: np.ndarray, fps: float) -> list[str]:
     p = np.asarray(positions, dtype=np.float64)
     names = [one.name for one in expectations_of(text) if not one.check(p, fps)]
     return names + [FLOOR] * bool(floating(p, fps) and not climbs([text]))
+
+
+def floating(p: Array, fps: float) -> list[tuple[int, int]]:
+    """Half-open ranges of frames, `FLIGHT` or longer, in which no joint is within 10 cm of the floor y = 0.
+
+    p: (frames, 22, 3) metres. A seat in the air bears nobody.
+    """
+    return [(a, b) for a, b in true_spans(p[..., 1].min(axis=1) > _FLOATS) if b - a > FLIGHT * fps]
 
 
 def climbs(texts: Iterable[str]) -> bool:

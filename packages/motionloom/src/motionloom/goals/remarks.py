@@ -2,14 +2,14 @@
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from motionloom.goals.contact import read_contact
 from motionloom.goals.heads import is_of_head
 from motionloom.goals.roles import MARK, SEVERAL, prompts_of, tells_of_several, without_two
 from motionloom.goals.timeline import Timeline
-from motionloom.goals.verbs import in_plainer_words, subject_of
+from motionloom.goals.verbs import in_plainer_words, rare_verb, subject_of
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
 
@@ -62,6 +62,15 @@ def clipped(line: str, most: int = LINE) -> str:
     return line if len(line) <= most else f"{line[: most - 4].rsplit(' ', 1)[0]} ..."
 
 
+def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
+    """A sentence with verbs whose manner is lost, or what texts are generated as; empty where none is."""
+    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
+    lost = [f"'{verb}'" for one, _ in changed if (verb := rare_verb(one))]
+    if lost:
+        return clipped(f"the manner of {', '.join(lost)} is not shown")
+    return clipped(", ".join(f"sampled in other words: '{other}'" for _, other in changed))
+
+
 def remarks_on_two(
     texts: Sequence[str], block_known: Known | None, known: Known | None, encoder: TextEncoder
 ) -> list[Remark]:
@@ -106,7 +115,12 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, 
     ]
     remarks += [Remark(text, SEVERAL, ()) for text in [one for one in english if tells_of_several(one)][:1]]
     matches = nearest_known(english, known, encoder) if known else []
-    return remarks + [Remark(one.prompt, one.remark(), _instead(one)) for one in matches if not one.near]
+    return remarks + [Remark(one.prompt, line, _instead(one)) for one in matches if (line := _unknown(one))]
+
+
+def _unknown(match: Nearest) -> str:
+    rare = rare_verb(match.prompt)
+    return match.remark() if not match.near else f"these weights hardly know '{rare}'" if rare else ""
 
 
 def _instead(match: Nearest) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import re
 
 from motionloom.goals.amounts import read_seconds
 from motionloom.goals.numerals import NUMBER, in_digits
-from motionloom.goals.verbs import base_of, kind_of_verb, word_patterns
+from motionloom.goals.verbs import TABLES, base_of, kind_of_verb, word_patterns
 
 _WORDS = word_patterns("seconds")
 
@@ -14,19 +14,6 @@ SHORTEST = 1.2
 LONGEST = 12.0
 """Seconds of the longest part by nature; a longer one is requested in numbers."""
 
-_SECONDS = {
-    "locomotion": 4.0,
-    "gesture": 4.0,
-    "state": 3.0,
-    "change": 3.0,
-    "event": 2.5,
-    "jump": 2.5,
-    "turn": 3.0,
-    "fight": 3.0,
-    "dance": 5.0,
-    "other": 4.0,
-}
-"""Kinds of verbs, and the seconds such an action takes."""
 _GOES_ON, WHOLE = ("locomotion", "state", "dance"), 5.0
 """What can go on, and what is repeated, does so for `WHOLE` seconds where it is the whole sentence."""
 _ON_STAIRS = 4.0
@@ -50,7 +37,7 @@ def natural_seconds(text: str) -> float:
     if (explicit := read_seconds(text)) is not None:
         return max(explicit, SHORTEST)
     kind = _kind(words)
-    seconds = _SECONDS[kind]
+    seconds = float(TABLES["seconds"][kind])
     if kind in ("change", "event") or _FALLS.search(words):  # "stumbles and falls"
         seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
     if match := re.search(rf"\b(?:{NUMBER}|\w+) (?:small |large |big |slow |quick )?steps\b", words):

@@ -7,7 +7,8 @@ from typing import Any
 
 from motionloom.reading import read_table
 
-_TABLES: dict[str, Any] = read_table("motionloom.goals", "verbs.toml")
+TABLES: dict[str, Any] = read_table("motionloom.goals", "verbs.toml")
+"""What is known of words, by kind."""
 
 NOUNS_AFTER = {"do", "make", "perform", "throw", "take", "give", "practice", "play"}
 """Verbs behind which "kicks and punches" are things."""
@@ -26,9 +27,9 @@ def _forms(*bases: str) -> dict[str, dict[str, str]]:
     for base in bases:
         moods["third"][_third(base)] = base
         moods["base"][base] = base
-        stem = base + base[-1] if base in _TABLES["doubled"] else base
+        stem = base + base[-1] if base in TABLES["doubled"] else base
         past = f"{stem[:-1]}ied" if stem.endswith("y") and stem[-2] not in "aeo" else f"{stem.removesuffix('e')}ed"
-        moods["past"][_TABLES["past"].get(base, past)] = base
+        moods["past"][TABLES["past"].get(base, past)] = base
         moods["gerund"]["lying" if base == "lie" else _gerund(stem)] = base
     return moods
 
@@ -43,12 +44,12 @@ def _gerund(stem: str) -> str:
     return (stem[:-1] if stem.endswith("e") and not stem.endswith("ee") else stem) + "ing"
 
 
-PLAINER: dict[str, str] = _TABLES["plainer"]
+PLAINER: dict[str, str] = TABLES["plainer"]
 """Bases of rare verbs, each with the base of a common one and what belongs to it: "walk slowly"."""
-MOODS = _forms(*(base for words in _TABLES["kinds"].values() for base in words), *PLAINER)
+MOODS = _forms(*(base for words in TABLES["kinds"].values() for base in words), *PLAINER)
 _FORMS = {form for forms in MOODS.values() for form in forms}
 _ADVERBS = {"then", "again", "once", "twice", "just", "also", "first", "finally", "soon", "next", "and", "but", "now"}
-_KINDS = {base: kind for kind, words in reversed(_TABLES["kinds"].items()) for base in words}
+_KINDS = {base: kind for kind, words in reversed(TABLES["kinds"].items()) for base in words}
 _KINDS |= {base: _KINDS[plain.split(" ")[0]] for base, plain in PLAINER.items() if base not in _KINDS}
 
 
@@ -119,31 +120,31 @@ def kind_of(item: str, mood: str) -> str:
 def kind_of_verb(word: str, phrase: str) -> str:
     """The kind of action that a verb names in a ``phrase``: sitting down is a change, sitting a state."""
     base = base_of(word) or word
-    changed = _TABLES["changed_by"].get(base)
+    changed = TABLES["changed_by"].get(base)
     if changed and re.search(changed[1], phrase):
         return changed[0]
     return _KINDS.get(base, "other")
 
 
-_DETERMINERS, _SIZES = _TABLES["places"]["<det>"], _TABLES["places"]["<size>"]
+_DETERMINERS, _SIZES = TABLES["places"]["<det>"], TABLES["places"]["<size>"]
 
 
 def words_pattern(pattern: str) -> re.Pattern[str]:
     """A pattern of ``verbs.toml`` with what stands for words in it, in any case of letters."""
     gerunds = "|".join(sorted(MOODS["gerund"], key=len, reverse=True))
-    for name, words in (_TABLES["places"] | {"<gerund>": f"(?:{gerunds})"}).items():
+    for name, words in (TABLES["places"] | {"<gerund>": f"(?:{gerunds})"}).items():
         pattern = pattern.replace(name, words)
     return re.compile(pattern, re.IGNORECASE)
 
 
 def word_patterns(part: str) -> dict[str, re.Pattern[str]]:
     """The patterns of one module in ``verbs.toml``, by name."""
-    return {name: words_pattern(pattern) for name, pattern in _TABLES["patterns"][part].items()}
+    return {name: words_pattern(pattern) for name, pattern in TABLES["patterns"][part].items()}
 
 
-_BARRED = tuple(words_pattern(pattern) for group in _TABLES["barred"].values() for pattern in group)
-_CLAUSES = [words_pattern(pattern) for pattern in _TABLES["barred"]["clauses"]]
-FALL_WAYS = {name: (words_pattern(way[0]), (way[1], way[2])) for name, way in _TABLES["fall_ways"].items()}
+_BARRED = tuple(words_pattern(pattern) for group in TABLES["barred"].values() for pattern in group)
+_CLAUSES = [words_pattern(pattern) for pattern in TABLES["barred"]["clauses"]]
+FALL_WAYS = {name: (words_pattern(way[0]), (way[1], way[2])) for name, way in TABLES["fall_ways"].items()}
 """Ways of falling, each with its words, and how far ahead and to the left the neck goes."""
 
 
@@ -221,7 +222,7 @@ class _Phrase:
         return self.pattern.sub(better, text)
 
 
-PHRASES = tuple(_Phrase.of(*line) for line in _TABLES["phrases"].items())
+PHRASES = tuple(_Phrase.of(*line) for line in TABLES["phrases"].items())
 
 
 def rare_verb(text: str) -> str:

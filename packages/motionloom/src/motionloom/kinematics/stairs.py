@@ -13,8 +13,6 @@ from motionloom.kinematics.physics import ANKLES, TOES, Array, smooth, velocity
 
 UP = 0.12
 """Metres of the lowest joint over the floor from which on somebody is above it."""
-FLOATS = 0.1
-"""Metres of the lowest joint over the floor from which on somebody floats who has no stairs."""
 FLIGHT = 0.8
 """Seconds: nobody who jumps is in the air longer."""
 CLIMB = 0.3
@@ -142,14 +140,6 @@ def falls_from_above(positions: np.ndarray, fps: float) -> bool:
         return False
     before = [hold for hold in footholds(p[: int(down.argmax())], fps) if hold.end - hold.first > fps / 4]
     return bool(before) and all(abs(hold.height - begins) < _ONE_LEVEL for hold in before)
-
-
-def floating(positions: np.ndarray, fps: float) -> list[tuple[int, int]]:
-    """Half-open ranges of frames, `FLIGHT` or longer, in which no joint is within `FLOATS` of the floor y = 0.
-
-    positions: (frames, 22, 3) metres. Unlike `hovering` it asks for the floor: a seat in the air bears nobody.
-    """
-    return _lasting(_lowest(np.asarray(positions, dtype=np.float64)) > FLOATS, fps)
 
 
 def _lasting(flags: np.ndarray, fps: float) -> list[tuple[int, int]]:

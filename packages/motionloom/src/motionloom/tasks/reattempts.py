@@ -11,9 +11,9 @@ from itertools import accumulate
 
 from motionloom.diffusion.sampling import row_seed
 from motionloom.goals.expected import FLOOR, missing
-from motionloom.goals.remarks import Remark, clipped
+from motionloom.goals.remarks import Remark, clipped, replacement_line
 from motionloom.goals.segment import Segment
-from motionloom.goals.verbs import in_plainer_words, rare_verb
+from motionloom.goals.verbs import in_plainer_words
 from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED
 from motionloom.tasks.long import compose
@@ -35,15 +35,6 @@ def attempt_seed(seed: int, number: int) -> int:
 
 PLAINER_FROM = 2
 """The attempt from which on the words are plainer ones; those before are of the words as they stand."""
-
-
-def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
-    """A sentence with verbs whose manner is lost, or what texts are generated as; empty where none is."""
-    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
-    lost = [f"'{verb}'" for one, _ in changed if (verb := rare_verb(one))]
-    if lost:
-        return clipped(f"the manner of {', '.join(lost)} is not shown")
-    return clipped(", ".join(f"sampled in other words: '{other}'" for _, other in changed))
 
 
 @dataclass(frozen=True, eq=False)

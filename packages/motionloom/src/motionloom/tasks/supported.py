@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from motionloom.edits.fitting import fit
+from motionloom.goals.expected import floating
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
-from motionloom.kinematics.stairs import UP, falls_from_above, floating, hovering
+from motionloom.kinematics.stairs import UP, falls_from_above, hovering
 from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
 

@@ -24,7 +24,7 @@ from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
 from motionloom.goals.expected import climbs, missing
 from motionloom.goals.heads import head_said
-from motionloom.goals.remarks import clipped, numbers_read, parts_read
+from motionloom.goals.remarks import clipped, numbers_read, parts_read, replacement_line
 from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
@@ -35,7 +35,7 @@ from motionloom.tasks.adapting import lines_by_text, remarks_on_words
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
-from motionloom.tasks.reattempts import ATTEMPTS, PLAINER_FROM, attempt_seed, reattempt, replacement_line
+from motionloom.tasks.reattempts import ATTEMPTS, PLAINER_FROM, attempt_seed, reattempt
 from motionloom.tasks.redraw import Timed
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
@@ -130,9 +130,8 @@ class Worded:
         """A sentence for verbs that were replaced, for each number that was missed, for what is not shown, and for an
         end where nothing happens."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
-        looked = self.attempts > 1 and self.missing
-        names = ", ".join(dict.fromkeys(self.missing))
-        unseen = clipped(f"not shown in {self.attempts} attempts: {names}") if looked else ""
+        looked = list(dict.fromkeys(self.missing)) if self.attempts > 1 else []
+        unseen = clipped(f"not shown in {self.attempts} attempts: {', '.join(looked)}") if looked else ""
         problems = [amount.problem for amount in self.amounts]
         return [*filter(None, [self.replaced, *problems, unseen, self.stillness(of=share)])]
 
