@@ -10,7 +10,17 @@ from collections.abc import Sequence
 
 from motionloom.goals.amounts import read_seconds
 from motionloom.goals.numerals import SMALL_NUMBERS, in_digits
-from motionloom.goals.verbs import MOODS, NOUNS_AFTER, base_of, finite, mood_of, subject_of, verb_of, word_patterns
+from motionloom.goals.verbs import (
+    MOODS,
+    NOUNS_AFTER,
+    TABLES,
+    base_of,
+    finite,
+    mood_of,
+    subject_of,
+    verb_of,
+    word_patterns,
+)
 
 _WORDS = word_patterns("ellipsis")
 
@@ -26,20 +36,6 @@ STAYS = re.compile(
 WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
 """Who stays somewhere after these stands still, which is an action of its own."""
 _ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
-_CYCLES = (
-    (r"(?:\w+ly )?(?:sit|kneel|lie|crouch|squat|bend|get down|take a seat)\b", r".*\b(?:up|upright|standing)\b"),
-    (r".*\blunge\b", r"(?:\w+ly )?stand up\b"),
-    (r"(?:raise|lift|put)\b", r"(?:\w+ly )?(?:lower|drop)\b|(?:put|bring|take)\b.*\bdown\b"),
-    (r"(?:stand|get|rise)\b.*\bup\b|stand\b", r"(?:\w+ly )?(?:sit|kneel|lie|crouch)\b"),
-)
-"""Patterns of two actions of which the second undoes the first, verbs in their bases."""
-_CYCLES_BEHIND_A_COMMA = (
-    (r".*\bforwards?\b", r".*\bback(?:wards?)?\b"),
-    (r".*\bup\b", r".*\bdown\b"),
-    (r".*\bleft\b", r".*\bright\b"),
-    (r".*\bright\b", r".*\bleft\b"),
-)
-"""Those of which both are done again only where a comma is before the number: "left, then right, twice"."""
 _OTHER = {"left": "right", "right": "left"}
 _REACH = 20
 """Parts that words may refer back over."""
@@ -77,7 +73,11 @@ def _again(parts: Sequence[str], part: str) -> list[str]:
     if not again:
         return []
     actions = [one for one in parts if not _stays(one)] or list(parts)
-    block = list(actions[-2:] if len(actions) > 1 and _are_reverse(actions[-2], actions[-1], _CYCLES) else actions[-1:])
+    block = list(
+        actions[-2:]
+        if len(actions) > 1 and _are_reverse(actions[-2], actions[-1], TABLES["cycles"]["always"])
+        else actions[-1:]
+    )
     side = (again["side"] or again["to"] or "").lower()
     switched = side in ("other", "opposite") or bool(re.match("switch|change|swap", in_base(alone)) and not side)
     if switched or (side in _OTHER and any(re.search(rf"\b{_OTHER[side]}\b", one) for one in block)):
@@ -115,7 +115,7 @@ def repeat_cycles(parts: Sequence[str], most: int) -> list[str]:
     if not found or _WORDS["repeats"].fullmatch(in_base(parts[-1].removeprefix(subject_of(parts[0])).strip())):
         return []
     resolved = resolve_ellipsis([*parts[:-1], parts[-1][: found.start()]])
-    cycles = _CYCLES + _CYCLES_BEHIND_A_COMMA if "," in found[0] else _CYCLES
+    cycles = TABLES["cycles"]["always"] + TABLES["cycles"]["comma"] if "," in found[0] else TABLES["cycles"]["always"]
     times = _times(found[1])
     if times < 2 or len(resolved) < 2 or len(resolved) - 2 + 2 * times > most:
         return []

@@ -408,7 +408,8 @@ def _falls_to(p: Array, fps: float, to: tuple[int, int]) -> bool:
     across = p[up, J["left_hip"], [0, 2]] - p[up, J["right_hip"], [0, 2]]
     left = across / max(float(np.linalg.norm(across)), 1e-9)
     front = np.array([-left[1], left[0]])
-    return float((tips @ (to[0] * front + to[1] * left)).mean()) > _TIPS
+    turned_over = to[0] * _faces_up(p, fps) > 0.1  # who falls backwards comes to lie on the back
+    return not turned_over and float((tips @ (to[0] * front + to[1] * left)).mean()) > _TIPS
 
 
 def _trunk_turns(p: Array) -> Array:

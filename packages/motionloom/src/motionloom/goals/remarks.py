@@ -9,7 +9,7 @@ from motionloom.goals.contact import read_contact
 from motionloom.goals.heads import is_of_head
 from motionloom.goals.roles import MARK, SEVERAL, prompts_of, tells_of_several, without_two
 from motionloom.goals.timeline import Timeline
-from motionloom.goals.verbs import in_plainer_words, rare_verb, subject_of
+from motionloom.goals.verbs import TABLES, in_plainer_words, rare_verb, subject_of, word_patterns
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
 
@@ -31,6 +31,7 @@ be this that one two three something somebody someone very like out off around t
 _LIGHT, _FUNCTION = frozenset(map(stem, _LIGHT_WORDS.split())), frozenset(_FUNCTION_WORDS.split())
 
 
+_DENIED = word_patterns("remarks")["denied"]
 LINE = 100
 """Characters of a line at most."""
 
@@ -113,6 +114,11 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, 
         for text in distinct
         if text not in english
     ]
+    remarks += [
+        Remark(text, f"'{match[1]}' is not understood: what it denies may be shown")
+        for text in english
+        if (match := _DENIED.search(text))
+    ]
     remarks += [Remark(text, SEVERAL, ()) for text in [one for one in english if tells_of_several(one)][:1]]
     matches = nearest_known(english, known, encoder) if known else []
     return remarks + [Remark(one.prompt, line, _instead(one)) for one in matches if (line := _unknown(one))]
@@ -153,20 +159,7 @@ def verb_words(text: str) -> tuple[str, ...]:
 # Whether a prompt is English: the weights have read nothing else. By letters (another alphabet), and by the small words
 # that every sentence of a language has; where there is nothing to go by a prompt counts as English.
 
-_ENGLISH_WORDS = """the and is are to with his her he she they their of on from while then up down forward walks runs
-person someone this that for by into out around back left right hand hands at as it its be was were"""
-_OTHER_WORDS = """
-der das ein eine einen einem einer und ist nach mit auf sich dann geht läuft springt seine ihre beiden vorwärts
-het een naar zijn haar met loopt vooruit iemand och ett sig går springer framåt og fremad hopper mann kvinne
-les une et avec puis vers dans qui marche saute homme femme personne
-las una con hacia camina salta corre persona hombre mujer luego su
-il lo gli che poi cammina avanti uomo donna um uma com para pessoa homem mulher anda
-się idzie skacze osoba człowiek jde skáče bir ve adam yürüyor kişi ileri
-"""
-"""German; Dutch and Scandinavian; French; Spanish; Italian and Portuguese; Polish, Czech and Turkish."""
-_SMALL_WORDS = "la le el en y e i du des se na los w z"
-"""Words that names and borrowed phrases have too: they count only beside another."""
-_ENGLISH, _OTHERS, _SMALL = (frozenset(words.split()) for words in (_ENGLISH_WORDS, _OTHER_WORDS, _SMALL_WORDS))
+_ENGLISH, _OTHERS, _SMALL = (frozenset(TABLES["languages"][name].split()) for name in ("english", "others", "small"))
 
 
 def is_english(text: str) -> bool:

@@ -20,6 +20,7 @@ from motionloom.goals.verbs import (
     MOODS,
     NOUNS_AFTER,
     PRONOUN,
+    TABLES,
     finite,
     kind_of,
     mood_of,
@@ -51,16 +52,6 @@ _SHORTENED = re.compile(
 """Words that end in a dot where no sentence ends."""
 _POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch": "crouch", "squat": "crouch"}
 """Verbs of who ends up low, and of who is: the weights know nobody who stays in a squat."""
-
-_TOGETHER = (
-    (
-        ("bend", "stoop", "crouch", "lean"),
-        ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
-    ),
-    (("reach",), ("pick", "grab", "take", "get")),
-    (("stumble", "trip", "slip", "stagger", "lose"), ("fall", "crash", "collapse", "tumble", "land")),
-)
-"""Somebody bends and grasps, stumbles and falls at once."""
 
 
 def split_actions(text: str) -> tuple[Part, ...]:
@@ -268,7 +259,7 @@ def _split_list(clause: str) -> list[str]:
     counted = any(one and (one.kind == "turn" or "gesture" not in kinds) for one in amounts)
     waits = kinds[0] == "state" and bool(_WORDS["waits"].match(items[1]))  # "stands there and waits"
     verbs = verb_of(items[0], mood), verb_of(items[1], mood)
-    together = not comma and any(verbs[0] in first and verbs[1] in second for first, second in _TOGETHER)
+    together = not comma and any(verbs[0] in one["first"] and verbs[1] in one["second"] for one in TABLES["together"])
     return items if comma or counted or (_follows(*kinds) and not waits and not together) else [clause]
 
 

@@ -120,9 +120,7 @@ class Worded:
     @property
     def replaced(self) -> str:
         """A sentence with the common verbs that replace rare ones; empty where none does."""
-        if self.said is None:
-            return ""
-        both = zip(self.said.segments, self.timeline.segments, strict=True)
+        both = zip((self.said or self.timeline).segments, self.timeline.segments, strict=True)
         return replacement_line([(one.text, other.text) for one, other in both])
 
     @property
