@@ -97,7 +97,7 @@ class _Phrase:
 
     text: str
 
-    def has(self, *patterns: str) -> bool:
+    def has(self, *patterns: str | re.Pattern[str]) -> bool:
         """Whether each of some patterns is in it."""
         return all(re.search(pattern, self.text) for pattern in patterns)
 

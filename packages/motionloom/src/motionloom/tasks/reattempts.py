@@ -51,11 +51,10 @@ class Reattempted:
         """A remark on each text that was replaced, and on each block that does not show what it should."""
         replaced = {segments[i].text: text for i, text in self.again.items() if text != segments[i].text}
         remarks = [Remark(one, replacement_line([(one, other)])) for one, other in replaced.items()]
-        for i, names in self.missing.items():
-            text, names = segments[i].text, [name for name in names if name != FLOOR]  # who floats is lowered
-            if not names:
-                continue
-            remarks.append(Remark(text, clipped(f"'{text[:40]}': not shown: {', '.join(names)}")))
+        for i, missed in self.missing.items():
+            text = segments[i].text
+            if names := [name for name in missed if name != FLOOR]:  # who floats is lowered
+                remarks.append(Remark(text, clipped(f"'{text[:40]}': not shown: {', '.join(names)}")))
         return remarks
 
 

@@ -276,8 +276,8 @@ def _held_to_words(
     blocks = range(len(timed.segments)) if changed is None else changed
     seconds = sum(timed.segments[i].seconds for i in blocks)
     if getattr(plan.values, "literal", True) or seconds > reattempts.LONGEST:
-        stays = not timed.foot_lock or _climbs(timed.segments) or any(one.goal is not None for one in timed.segments)
-        return Result((motion if stays or timed.path else lowered(motion),), blocks=timed.blocks)
+        on_floor = timed.foot_lock and plan.timeline and not plan.timeline.asks and not _climbs(timed.segments)
+        return Result((lowered(motion) if on_floor else motion,), blocks=timed.blocks)
     found = reattempts.reattempt(timed, motion, blocks, start=plan.start, progress=progress.repeat)
     motion, notes = found.motion, found.notes(timed.segments)
     goals = [timed.path, *(segment.goal for segment in timed.segments)]
