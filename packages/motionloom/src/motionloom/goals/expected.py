@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
+from motionloom.goals.tumbling import FLAT, faces_up, log_roll, pitch
 from motionloom.goals.verbs import FALL_WAYS, asserted, base_of, in_plainer_words, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Side, count
 from motionloom.kinematics.gestures import (
@@ -56,7 +57,7 @@ _TURNS, _TURNS_ROUND, _SPINS = np.radians(25), (np.radians(120), np.radians(240)
 _LOW, _DOWN, _UP = 0.85, 0.4, 0.85
 """Leg lengths of the pelvis over the feet: below it somebody crouches, kneels or sits; over the floor of somebody who
 sits or lies on it; over the feet of somebody who is up."""
-_UPRIGHT, _FLAT = np.radians(50), np.radians(60)
+_UPRIGHT = np.radians(50)
 """Inclination of the trunk below which somebody is upright, above which somebody lies."""
 _BENDS, _LEANS = np.radians(30), np.radians(8)
 """Inclination of the trunk of who bends, and its sideways part of who leans to a side."""
@@ -279,9 +280,9 @@ def _postures(phrase: _Phrase) -> Iterator[_Named]:
     if phrase.has(r"\b(?:lie|lies|lying)\b|\blay(?:s|ing)? down\b") and not phrase.has(
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
     ):
-        yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > _FLAT), 0.5, fps)
+        yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > FLAT), 0.5, fps)
         if up := re.search(r"\bon (?:the|his|her|their|its|your|my) (back|stomach|belly|front)\b", phrase.text):
-            yield f"lying on the {up[1]}", lambda p, fps: (_faces_up(p, fps) > 0) == (up[1] == "back")
+            yield f"lying on the {up[1]}", lambda p, fps: (faces_up(p, fps) > 0) == (up[1] == "back")
     if phrase.has(r"\b(?:crouch|kneel|squat|duck)"):
         yield "going low", lambda p, fps: float(pelvis_height(p).min()) < _LOW
     if phrase.has(
@@ -359,10 +360,10 @@ def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
     if (rolls := re.search(r"\brolls? (forward|backward)|\b(forward|backward) rolls?\b", phrase.text)) is not None:
         way = rolls[1] or rolls[2]
-        yield f"a roll {way}", lambda p, fps: _pitch(p) * (1 if way == "forward" else -1) > np.pi
+        yield f"a roll {way}", lambda p, fps: pitch(p) * (1 if way == "forward" else -1) > np.pi
     if (aside := re.search(rf"\brolls? (?:over )?(?:on {_DET} \w+ )?to {_DET} (left|right)", phrase.text)) is not None:
         sign = 1 if aside[1] == "left" else -1
-        yield f"a roll to the {aside[1]}", lambda p, fps: sign * _log_roll(p) > np.pi / 2
+        yield f"a roll to the {aside[1]}", lambda p, fps: sign * log_roll(p) > np.pi / 2
     if phrase.has(_WORDS["falls"]):
         leaps = phrase.has(r"\b(?:jump|leap|flip|div|somersault)")
         for name, (words, to) in FALL_WAYS.items():
@@ -408,31 +409,8 @@ def _falls_to(p: Array, fps: float, to: tuple[int, int]) -> bool:
     across = p[up, J["left_hip"], [0, 2]] - p[up, J["right_hip"], [0, 2]]
     left = across / max(float(np.linalg.norm(across)), 1e-9)
     front = np.array([-left[1], left[0]])
-    turned_over = to[0] * _faces_up(p, fps) > 0.1  # who falls backwards comes to lie on the back
+    turned_over = to[0] * faces_up(p, fps) > 0.1  # who falls backwards comes to lie on the back
     return not turned_over and float((tips @ (to[0] * front + to[1] * left)).mean()) > _TIPS
-
-
-def _trunk_turns(p: Array) -> Array:
-    """(frames - 1, 3) radians between frames about the trunk's left, up and front."""
-    left, up = p[:, J["left_shoulder"]] - p[:, J["right_shoulder"]], p[:, J["neck"]] - p[:, 0]
-    up = up / np.linalg.norm(up, axis=-1, keepdims=True)
-    left = left - (left * up).sum(-1, keepdims=True) * up
-    left = left / np.maximum(np.linalg.norm(left, axis=-1, keepdims=True), 1e-9)
-    front = np.cross(left, up)
-    about_left = (np.diff(up, axis=0) * front[:-1]).sum(-1)
-    about_up = (np.diff(front, axis=0) * left[:-1]).sum(-1)
-    return np.stack([about_left, about_up], axis=-1)
-
-
-def _pitch(p: Array) -> float:
-    """Radians by which the trunk turns heels over head, forwards."""
-    return float(_trunk_turns(p)[:, 0].sum())
-
-
-def _log_roll(p: Array) -> float:
-    """Radians by which somebody who lies turns to the left about the spine."""
-    lies = torso_inclination(p)[:-1] > _FLAT
-    return float(_trunk_turns(p)[lies, 1].sum())
 
 
 def _over_floor(p: Array) -> Array:
@@ -454,12 +432,6 @@ def _near(p: Array, joint: str) -> np.ndarray:
 def _knees(p: Array) -> Array:
     """(frames, 2) leg lengths of the left and the right knee over the hips."""
     return (p[:, [J["left_knee"], J["right_knee"]], 1] - p[:, [J["left_hip"], J["right_hip"]], 1]) / leg_length(p)
-
-
-def _faces_up(p: Array, fps: float) -> float:
-    """How far up the chest faces in the last quarter of a second: above 0 on the back, below on the belly."""
-    across = p[:, J["left_shoulder"]] - p[:, J["right_shoulder"]]
-    return float(np.cross(across, p[:, J["neck"]] - p[:, 0])[-max(1, round(fps / 4)) :, 1].mean())
 
 
 def _arms_out(p: Array) -> np.ndarray:

@@ -125,13 +125,12 @@ class Worded:
 
     @property
     def shortfalls(self) -> list[str]:
-        """A sentence for verbs that were replaced, for each number that was missed, for what is not shown, and for an
-        end where nothing happens."""
+        """A sentence for replaced verbs, each missed number, what is not shown, and an end without motion."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
         looked = list(dict.fromkeys(self.missing)) if self.attempts > 1 else []
         unseen = clipped(f"not shown in {self.attempts} attempts: {', '.join(looked)}") if looked else ""
-        problems = [amount.problem for amount in self.amounts]
-        return [*filter(None, [self.replaced, *problems, unseen, self.stillness(of=share)])]
+        problems = [self.replaced, *(amount.problem for amount in self.amounts)]
+        return [*filter(None, [*problems, unseen, self.stillness(of=share)])]
 
     @property
     def still_from(self) -> float | None:
