@@ -6,26 +6,10 @@ from pathlib import Path
 from motionloom.goals import amounts, numerals, verbs
 
 PLACE = Path(__file__).parents[1] / "studio" / "src" / "prior" / "words.json"
-PATTERNS = {
-    "way": amounts._WAY,
-    "degrees": amounts._DEGREES,
-    "part_of_turn": amounts._PART_OF_TURN,
-    "turns_often": amounts._TURNS_OFTEN,
-    "arc": amounts._ARC,
-    "circle": amounts._CIRCLE,
-    "steps": amounts._STEPS,
-    "steps_often": amounts._STEPS_OFTEN,
-    "seconds": amounts._SECONDS,
-    "often": amounts._OFTEN,
-    "often_kept": amounts._OFTEN_OF_LIMBS,
-    "many": amounts._MANY,
-    "counts_another": amounts._COUNTS_ANOTHER,
-    "ages": amounts._AGES,
-    "body": amounts._BODY,
-    "held": amounts._HELD,
-    "travels": amounts._TRAVELS,
-    "on_one_leg": amounts._ON_ONE_LEG,
-    "else": amounts._ELSE,
+NAMES = """way degrees part_of_turn turns_often arc circle steps steps_often seconds often many counts_another ages body
+held travels on_one_leg else"""
+PATTERNS = {name: amounts._WORDS[name] for name in NAMES.split()} | {
+    "often_kept": amounts._WORDS["often_of_limbs"],
     "number_words": numerals._WORDS,
     "and_a_half": numerals._HALF,
 }

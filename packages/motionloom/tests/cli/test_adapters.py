@@ -156,7 +156,7 @@ def test_actions_in_a_row_are_parted_unless_they_are_left_whole(
     ]
     assert main(line) == 0
     output = capsys.readouterr()
-    assert "one after the other: 'a person walks' 4.0 s, 'a person sits down' 3.0 s; --as-one" in output.err
+    assert "one after the other: walks 4.0 s, sits down 3.0 s; --as-one" in output.err
     (motion,) = json.loads(output.out)["motions"]
     assert motion["segments"] == [
         {"begin": 0.0, "end": 4.0, "text": "a person walks"},

@@ -223,7 +223,7 @@ def test_what_is_missing_in_a_segment_is_told_and_a_literal_motion_is_the_first(
     monkeypatch.setattr(reattempts, "missing", lambda text, places, fps: ["a kick"] * (text == "kick"))
     words = ["compose", "walk", "kick", "--seconds", "1", "--steps", "2", "--json", "--weights", weights]
     assert main([*words, "--out", "looked.npz"]) == 0
-    output, line = capsys.readouterr(), "'kick': not found in 4 attempts: a kick"
+    output, line = capsys.readouterr(), "'kick': not shown: a kick"
     assert f"motionloom: {line}\n" in output.err
     assert line in json.loads(output.out)["remarks"]
     assert main([*words, "--literal", "--out", "literal.npz"]) == 0

@@ -275,6 +275,6 @@ def test_bodies_that_are_in_each_other_are_measured_and_told(
     assert apart["least_trunk_distance"] > 2
     assert len(report["remarks"]) == 1
     assert report["remarks"][0] == (
-        f"duet 1: the two are in each other by {100 * inside['deepest_overlap']:.0f} cm in {len(person)} frames"
+        f"duet 1: the two bodies overlap by up to {100 * inside['deepest_overlap']:.0f} cm; frames: {len(person)}"
     )
     assert report["remarks"][0] in output.err

@@ -77,7 +77,6 @@ PARTS = {
     * 3,
     # again and again
     "raise your right arm, lower it, and repeat three times": ["raise your right arm", "lower your right arm"] * 3,
-    "Sit to stand from a chair without using the arms, four repetitions": ["sit down on a chair", "stand up"] * 4,
     "a person sits down and stands up three times": ["a person sits down", "a person stands up"] * 3,
     "he raises both arms, then lowers them, twice": ["he raises both arms", "he lowers both arms"] * 2,
     "leans left, then right, 2 reps": ["leans left", "leans right"] * 2,
@@ -87,7 +86,6 @@ PARTS = {
     ],
     # what comes before the action
     "victory emote: waves, then bows": ["waves", "bows"],
-    "she spins, then finishes with a curtsy": ["she spins", "she does a curtsy"],
     "he walks, then waves at the end with a smile": ["he walks", "he waves at the end with a smile"],
     "a hiker walks, stops to wipe the forehead and goes on": [
         "a hiker walks",
@@ -100,11 +98,6 @@ PARTS = {
         "he picks up a box",
         "he carries the box a few steps",
         "he sets the box down",
-    ],
-    "drink from a bottle and put it down": ["drink from a bottle", "put the bottle down"],
-    "she walks up to a chair and sits down with legs crossed": [
-        "she walks up to a chair",
-        "she sits down with legs crossed on the chair",
     ],
     # the end of a bend
     "he bends down to touch his toes, comes up and waves": [

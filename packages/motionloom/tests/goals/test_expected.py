@@ -101,6 +101,32 @@ def lying(up: int) -> np.ndarray:
     return p
 
 
+def falling(degrees: float, *, turned: float = 0.0) -> np.ndarray:
+    """Somebody who tips over about the feet within a second, to an angle from ahead to the left, and lies there."""
+    p = spun(standing(), np.full(80, np.radians(turned)))
+    tip = np.radians(85) * np.clip((np.arange(80) - 20) / 20, 0, 1)
+    way = np.radians(degrees + turned)
+    height = p[..., 1].copy()
+    p[..., 0] += height * np.sin(tip)[:, None] * np.sin(way)
+    p[..., 2] += height * np.sin(tip)[:, None] * np.cos(way)
+    p[..., 1] = height * np.cos(tip)[:, None]
+    return p
+
+
+def rolling(turns: float, axis: int) -> np.ndarray:
+    """Somebody who turns about the left (0) or, lying on the back, about the spine (1), in a metre's height."""
+    p = standing()
+    p = p - p[:, :1]
+    angles = np.linspace(0, 2 * np.pi * turns, 80)
+    cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    a, b = ((1, 2), (2, 0))[axis]
+    turned = p.copy()
+    turned[..., a], turned[..., b] = cos * p[..., a] - sin * p[..., b], sin * p[..., a] + cos * p[..., b]
+    if axis == 1:  # laid on the back
+        turned = np.stack([turned[..., 0], turned[..., 2], -turned[..., 1]], axis=-1)
+    return turned - turned[..., 1].min(axis=1)[:, None, None] * np.array([0.0, 1.0, 0.0])
+
+
 def rising(p: np.ndarray, metres: float) -> np.ndarray:
     return p + np.linspace(0, metres, len(p))[:, None, None] * [0, 1, 0]
 
@@ -136,12 +162,19 @@ def rising(p: np.ndarray, metres: float) -> np.ndarray:
         ("she raises the left leg", with_leg(0, ankle=0.3), with_leg(1, ankle=0.3)),
         ("a man walks up the stairs", rising(walking(0.6), 0.5), walking(0.6)),
         ("a man sneaks", walking(0.6), walking(0.2)),
-        ("a man falls backwards", lying(1), walking(-1.2)),
+        ("a man falls backwards", falling(180), falling(0)),
+        ("he fell on his back", falling(180, turned=120), falling(0, turned=120)),
+        ("a boy falls down forwards", falling(0), falling(180)),
+        ("she falls flat on her face", falling(0, turned=-90), falling(180, turned=-90)),
+        ("he collapses to the left", falling(90, turned=45), falling(-90, turned=45)),
+        ("he falls sideways to the right", falling(-90), falling(90)),
+        ("a gymnast does a forward roll", rolling(1, 0), rolling(-1, 0)),
+        ("she rolls backwards", rolling(-1, 0), rolling(1, 0)),
+        ("he rolls on the floor to the left", rolling(0.5, 1), rolling(-0.5, 1)),
         ("he walks with his arms out", with_arms_out(), walking(1.2)),
         ("she lowers the left arm", raising(1), raising(0)),
         ("he raises both arms to shoulder height", at_shoulders(), standing()),
         ("he lies down on his back", lying(1), lying(-1)),
-        ("she talks to somebody", standing(), walking(1.2)),
         ("he crosses his arms", with_crossed_arms(), standing()),
         ("a man bends to the left", leaning(20), leaning(-20)),
         ("he bends down", bent(70), standing()),
@@ -178,6 +211,13 @@ def test_what_nothing_can_be_checked_of_is_met(text: str) -> None:
     assert share_met(text, standing(), FPS) == 1
 
 
+def test_who_floats_misses_the_floor_unless_the_words_climb() -> None:
+    aloft = standing() + np.array([0.0, 0.5, 0.0])
+    assert missing("a person waits", aloft, FPS) == ["the floor under the feet"]
+    assert missing("a person stands on a ladder", aloft, FPS) == ["a way up"]
+    assert missing("a person waits", jumping(0.3), FPS) == []
+
+
 def test_a_side_of_limbs_is_no_way() -> None:
     """A kick with the left leg turns nowhere, and who runs in place goes nowhere but hops."""
     names = [one.name for one in expectations_of("a person kicks with the left leg")]
@@ -188,6 +228,6 @@ def test_a_side_of_limbs_is_no_way() -> None:
 
 
 def test_names_read_as_a_list() -> None:
-    """They are printed: "not found in 4 attempts: a turn to the left"."""
+    """They are printed: "not shown in 4 attempts: a turn to the left"."""
     assert missing("a person turns left", turning(-80), FPS) == ["a turn to the left"]
     assert missing("a person walks forward, slowly", standing(), FPS) == ["a way forward"]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.goals.remarks import nearest_known, remarks_on, verb_words
+from motionloom.goals.remarks import LINE, nearest_known, remarks_on, verb_words
 from motionloom.runtime.text.known import NEAR, Nearest
 from motionloom.weights.prior import Prior
 
@@ -51,4 +51,5 @@ def test_phrases_that_nobody_looked_at() -> None:
     assert [one.text for one in remarks] == ["eine Person geht vorwärts", "vacuuming the living room"]
     assert remarks[0].instead == ()
     assert len(remarks[1].instead) == 3
-    assert all(f"'{sentence}'" in remarks[1].line for sentence in remarks[1].instead)
+    assert remarks[1].instead[0][:20] in remarks[1].line
+    assert len(remarks[1].line) <= LINE

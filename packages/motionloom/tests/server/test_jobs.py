@@ -56,8 +56,8 @@ def test_a_stream_goes_on_behind_the_event_that_was_seen_last(server: Server) ->
 def test_a_sentence_of_two_actions_is_parted_as_on_the_command_line(server: Server) -> None:
     one = server.draw(task="generate", prompt="a person walks, then jumps", seconds=4.0, steps=4)
     (line,) = one["remarks"]
-    assert line.startswith("one after the other: 'a person walks' ")
-    assert "'a person jumps' " in line
+    assert line.startswith("one after the other: walks ")
+    assert "jumps " in line
     listed = [{"text": "a person walks", "seconds": 2.0}, {"text": "a person jumps", "seconds": 2.0}]
     assert one["results"][0]["frames"] == sum(round(20 * part["seconds"]) for part in listed)
 

@@ -24,7 +24,7 @@ from motionloom.weights.prior import Prior
 from tests.tasks.test_redraw import STEPS, prior, sampled, straight, timed
 
 __all__ = ["prior"]
-SEGMENTS = tuple(Segment(text, 2.0) for text in ("a person walks", "a man trudges", "a person sits"))
+SEGMENTS = tuple(Segment(text, 2.0) for text in ("a person walks", "a man saunters", "a person sits"))
 FRAMES = 40
 
 
@@ -47,7 +47,7 @@ def lines(found: Reattempted) -> list[str]:
 
 
 def test_a_block_that_shows_its_words_from_another_seed_is_of_that_one(prior: Prior, looks: Any) -> None:
-    looks["a man trudges"] = [1, 1, 0]
+    looks["a man saunters"] = [1, 1, 0]
     timeline = timed(prior, SEGMENTS)
     old, seen = sampled(timeline), []
     with watching(seen.append):
@@ -55,7 +55,7 @@ def test_a_block_that_shows_its_words_from_another_seed_is_of_that_one(prior: Pr
     assert not seen, "attempts are not watched"
     assert found.again == {1: "a man walks"}
     assert not found.missing
-    assert lines(found) == ["'a man trudges' is generated as 'a man walks', which these weights know better"]
+    assert lines(found) == ["the manner of 'saunters' is not shown"]
     plain = timed(prior, [SEGMENTS[0], replace(SEGMENTS[1], text="a man walks"), SEGMENTS[2]])
     expected = resample_runs(plain, old, timeline.blocks, [Run(1, 2, 1, 2)], seed=attempt_seed(1, 2))
     assert np.array_equal(found.motion.rotations, expected.rotations)
@@ -72,11 +72,11 @@ def test_what_no_attempt_shows_stays_as_it_was_and_is_reported(prior: Prior, loo
     found = reattempt(timeline, old, range(3))
     assert found.motion is old
     assert found.again == {}
-    assert lines(found) == ["'a person sits': not found in 4 attempts: a turn to the left"]
+    assert lines(found) == ["'a person sits': not shown: a turn to the left"]
 
 
 def test_an_attempt_that_spoils_a_neighbour_is_not_kept(prior: Prior, looks: Any) -> None:
-    looks["a person walks"], looks["a man trudges"] = [0, 1], [1, 0]
+    looks["a person walks"], looks["a man saunters"] = [0, 1], [1, 0]
     timeline = timed(prior, SEGMENTS)
     old = sampled(timeline)
     found = reattempt(timeline, old, range(3))
@@ -85,17 +85,16 @@ def test_an_attempt_that_spoils_a_neighbour_is_not_kept(prior: Prior, looks: Any
 
 
 def test_of_one_block_an_attempt_is_the_motion_of_its_seed(prior: Prior, looks: Any) -> None:
-    looks["a man trudges"] = [2, 1, 2]
+    looks["a man saunters"] = [2, 1, 2]
     timeline = timed(prior, SEGMENTS[1:2], seed=5)
     found = reattempt(timeline, sampled(timeline), [0])
-    plain = replace(SEGMENTS[1], text="a man walks")
-    expected = concatenate(*compose(prior, [plain], steps=STEPS, seed=attempt_seed(5, 1)))
+    expected = concatenate(*compose(prior, [SEGMENTS[1]], steps=STEPS, seed=attempt_seed(5, 1)))
     assert np.array_equal(found.motion.rotations, expected.rotations)
     assert found.missing == {0: ["a turn to the left"]}
 
 
 def test_goals_paths_and_what_goes_on_from_a_motion_are_left_alone(prior: Prior, looks: Any) -> None:
-    for text in ("a person walks", "a man trudges", "a person sits"):
+    for text in ("a person walks", "a man saunters", "a person sits"):
         looks[text] = [1]
     goal = Goal.nothing(FRAMES)
     goal.positions[20, 0], goal.mask[20, 0, ::2] = (0.0, 0.0, 0.4), True
@@ -128,14 +127,14 @@ def motion_of(plan: Plan, prior: Prior) -> tuple[Motion, list[str], list[tuple[i
 def test_a_request_is_held_against_its_words_unless_it_is_literal_or_long(
     prior: Prior, looks: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looks["a man trudges"] = [1, 0]
+    looks["a man saunters"] = [1, 1, 0]
     timeline, sampling = Timeline(SEGMENTS), Sampling(steps=STEPS, count=1)
     plan = Plan(task="compose", values=Compose(timeline=timeline), sampling=sampling, timeline=timeline)
     motion, remarks, reports = motion_of(plan, prior)
-    assert remarks == ["'a man trudges' is generated as 'a man walks', which these weights know better"]
+    assert remarks == ["the manner of 'saunters' is not shown"]
     assert reports[-1] == (9, 9)
     assert reports.count((9, 9)) > 1
-    looks["a man trudges"] = [1, 0]
+    looks["a man saunters"] = [1, 1, 0]
     literal = replace(plan, values=Compose(timeline=timeline, literal=True))
     first, nothing, _ = motion_of(literal, prior)
     assert nothing == []
@@ -161,7 +160,7 @@ def test_only_changed_blocks_are_sampled_again_and_all_are_reported(
     before, sampling = timed(prior, SEGMENTS, count=1), Sampling(steps=STEPS, count=1)
     old = sampled(before)
     segments = (SEGMENTS[0], SEGMENTS[1], replace(SEGMENTS[2], text="a person jumps"))
-    for text in ("a person walks", "a man trudges", "a person jumps"):
+    for text in ("a person walks", "a man saunters", "a person jumps"):
         looks[text] = [1]
     timeline = Timeline(segments)
     plan = Plan(
@@ -173,7 +172,7 @@ def test_only_changed_blocks_are_sampled_again_and_all_are_reported(
     )
     _, remarks, _ = motion_of(plan, prior)
     assert sampled_runs == [Run(2, 3, 2, 3)] * 3
-    missed = "not found in 4 attempts: a turn to the left"
+    missed = "not shown: a turn to the left"
     assert remarks == [f"'{one.text}': {missed}" for one in segments]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from motionloom import rotations as rot
+from motionloom.goals.expected import climbs, floating
 from motionloom.kinematics.physics import WRISTS, J
 from motionloom.kinematics.stairs import falls_from_above, hovering, in_the_air, stairs
 from motionloom.motion import Motion
@@ -13,7 +14,7 @@ from motionloom.requests.sampling import Sampling
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import run
 from motionloom.tasks.run import Models, Plan, Result
-from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated, remarks_on_air
+from motionloom.tasks.supported import add_support, add_support_between, is_elevated, remarks_on_air
 
 FPS = 20.0
 
@@ -160,7 +161,10 @@ def test_words_of_stairs_ladders_and_climbing(text: str, expected: bool) -> None
 
 def test_steps_come_only_where_they_may_and_other_frames_stay() -> None:
     flight = climbing(0, 0.2, 0.33, 0.55, 0.66)
-    assert add_support(flight, stairs=False) is flight
+    level = add_support(flight, stairs=False)
+    assert floating(flight.positions(), FPS)
+    assert not floating(level.positions(), FPS)
+    assert level.positions()[..., 1].min() > -0.05
     rising = lifted(np.arange(60) / FPS)
     part = add_support_between(rising, [(30, 50)])
     whole = add_support(rising)

@@ -106,7 +106,7 @@ def test_what_is_not_shown_is_generated_again(prior: Prior, monkeypatch: pytest.
     assert [one.timeline.segments[0].text for one in motions] == ACTIONS
     assert [bool(one.missing) for one in motions] == [False, False, True]
     [line] = [one for one in motions[2].shortfalls if "attempts" in one]
-    assert line.startswith("not found in 4 attempts: a wave")
+    assert line.startswith("not shown in 4 attempts: a wave")
     (third,) = generate(prior, ACTIONS[1], seconds=1.0, steps=2, seed=seeds[5], as_one=True)
     np.testing.assert_allclose(motions[1].motion.positions(), third.positions(), atol=1e-5)
 
@@ -141,27 +141,26 @@ def test_later_attempts_have_common_verbs_for_rare_ones(prior: Prior, monkeypatc
 
     def missing(text: str, *_) -> list[str]:
         looked.append(text)
-        return ["a way"] if len(looked) == 1 else []
+        return ["a way"] if len(looked) < 3 else []
 
     monkeypatch.setattr(worded, "missing", missing)
-    (one,) = worded.generate_worded(prior, "a soldier trudges home", seconds=1.0, steps=2, seed=7)
-    assert looked == ["a soldier trudges home"] * 2
+    (one,) = worded.generate_worded(prior, "a soldier saunters home", seconds=1.0, steps=2, seed=7)
+    assert looked == ["a soldier saunters home"] * 3
     assert one.timeline.segments[0].text == "a soldier walks home"
-    line = "'a soldier trudges home' is generated as 'a soldier walks home', which these weights know better"
-    assert line in one.shortfalls
-    (kept,) = worded.generate_worded(prior, "a soldier trudges home", seconds=1.0, steps=2, seed=7)
+    assert "the manner of 'saunters' is not shown" in one.shortfalls
+    (kept,) = worded.generate_worded(prior, "a soldier saunters home", seconds=1.0, steps=2, seed=7)
     assert not kept.replaced
-    assert kept.timeline.segments[0].text == "a soldier trudges home"
+    assert kept.timeline.segments[0].text == "a soldier saunters home"
     looked.clear()
 
     def first_two(text: str, *_) -> list[str]:
         looked.append(text)
-        return ["a way"] if "saunters" in text and len(looked) < 5 else []
+        return ["a way"] if "saunters" in text and len(looked) < 9 else []
 
     monkeypatch.setattr(worded, "missing", first_two)
     monkeypatch.setattr(reattempts, "missing", first_two)
     (several,) = worded.generate_worded(prior, "a man saunters in, then waves", seconds=3.0, steps=2)
-    assert several.replaced.startswith("'a man saunters in' is generated as 'a man walks in'")
+    assert several.replaced == "the manner of 'saunters' is not shown"
     assert several.timeline.segments[1].text == "a man waves"
 
 

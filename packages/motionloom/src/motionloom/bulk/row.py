@@ -274,7 +274,7 @@ class Sources:
         return None
 
     def _worded(self, row: Row, metre: float) -> tuple[Timeline | None, str | None]:
-        """The row's prompt as a timeline, where numbers in it are kept, and its hash.
+        """The row's prompt as a timeline, where numbers in it are kept or actions follow each other, and its hash.
 
         It is as long as the numbers need where no time is given. Many rows have the same words: they are read once.
         """
@@ -286,7 +286,8 @@ class Sources:
 
         def read_words() -> tuple[Timeline | None, str | None]:
             timeline = timeline_of(row.words, row.seconds, amounts=True, metre=metre)
-            return (timeline, digest_timeline(timeline, None)) if timeline.readings else (None, None)
+            one = not timeline.readings and len(timeline.segments) == 1
+            return (None, None) if one else (timeline, digest_timeline(timeline, None))
 
         return self._texts.of(words, read_words)
 

@@ -323,8 +323,8 @@ def _measures(duet: Sequence[Motion]) -> dict[str, float]:
 def _remarks(measures: Sequence[dict[str, float]]) -> list[str]:
     """A sentence for each duet whose bodies are in each other."""
     return [
-        f"{f'duet {number}: ' if len(measures) > 1 else ''}the two are in each other by "
-        f"{100 * one['deepest_overlap']:.0f} cm in {one['overlapping_frames']} frames"
+        f"{f'duet {number}: ' if len(measures) > 1 else ''}the two bodies overlap by up to "
+        f"{100 * one['deepest_overlap']:.0f} cm; frames: {one['overlapping_frames']}"
         for number, one in enumerate(measures, 1)
         if one["overlapping_frames"]
     ]

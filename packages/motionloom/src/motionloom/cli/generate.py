@@ -91,7 +91,7 @@ def run_generate(arguments: Namespace) -> int:
         if under := motion["stairs"]:
             whose = f"motion {number} " if len(motions) > 1 else ""
             say(
-                f"{whose}goes over {under['steps']} steps of {under['rise']:.2f} m, which are not shown; "
+                f"{whose}goes over {under['steps']} stairs of {under['rise']:.2f} m, which are not shown; "
                 "--json has their places"
             )
     length = usual_seconds(prompts[0]) if arguments.seconds is None else arguments.seconds
@@ -149,11 +149,11 @@ def _timeline(arguments: Namespace, prior: Prior, prompt: str, metre: float) -> 
         metre=metre,
     )
     if remark := numbers_read(timeline):
-        say(f"{remark}; --literal leaves numbers to the network")
+        say(f"{remark}; --literal leaves them")
     if remark := parts_read(timeline):
         if arguments.solver != SOLVER:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
-        say(f"{remark}; --as-one leaves the sentence whole")
+        say(f"{remark}; --as-one leaves it whole")
     return timeline
 
 

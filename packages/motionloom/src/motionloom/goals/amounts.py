@@ -12,11 +12,14 @@ from typing import Literal, get_args
 import numpy as np
 
 from motionloom.goals.goal import FPS, Goal
+from motionloom.goals.heads import head_said
 from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.paths import check_speed
-from motionloom.goals.verbs import base_of, kind_of_verb
+from motionloom.goals.verbs import TABLES, asserted, base_of, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Counted, Side, count, foot_moves
 from motionloom.motion import ground_pose
+
+_WORDS = word_patterns("amounts")
 
 Kind = Literal["turn", "way", "steps", "arc", "count"]
 Direction = Literal["forward", "backward", "left", "right"]
@@ -88,104 +91,14 @@ RADIUS = 1.0
 """Metres: of a half circle that is walked where its size is not said."""
 _UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
 _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
-_WAY = re.compile(
-    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
-    r"(?!\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
-)
-_DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
-_PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
-_TURNS_ROUND = re.compile(
-    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:around|round|about|back)"
-    r"(?= *$|[,.]| to (?:face|go|walk|run|the (?:left|right|other|opposite))| (?:again|\w+ly|once)\b)"
-)
-"""A half turn, unless another size is said."""
-_TURNS_ASIDE = re.compile(
-    r"\bturn(?:s|ed|ing)? (?:\w+ly )?(?:to )?(?:the |his |her |their |its |your )?(?:left|right) *$"
-)
-"""Between other actions a quarter turn."""
-_TURNS_OFTEN = re.compile(rf"\b{NUMBER} (?:full |complete |whole )?(?:turns|spins|pirouettes|rotations)\b")
-_ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi|full|complete|whole|0\.5)(?: of a)?[ -]?circles?\b")
-_CIRCLE = re.compile(r"\bin a (?:(?:(?:counter|anti)?[ -]?clockwise|small|tight|right|left|full) )*circle\b(?! of)")
-_STEPS = re.compile(
-    rf"(?<!up )(?<!down )(?:\b{NUMBER}|(?:(?<=takes )|(?<=take )|(?<=taking )|(?<=took ))a(?:n)?(?: single)?)"
-    r"(?: (small|tiny|short|baby|little|big|large|long|giant|huge|quick|slow|careful))?(?: (side|backward|forward))?"
-    r"[ -]?(?:steps?|paces|strides?|sidesteps?)\b"
-)
-_STEPS_OFTEN = re.compile(
-    rf"\b((?:side)?step(?:s|ped|ping)?)\b(?! (?:up|down|on|over|onto)\b)((?: to)?(?: the)?(?: \w+)?) {NUMBER} times?\b"
-)
-_SECONDS = re.compile(
-    r"(?<!\bafter )(?<!\bin )(?<!\bwithin )(?<!\bevery )(?<!\blast )(?<!\bfirst )(?<!\bof )"
-    rf"(?<![\w.]){NUMBER}[ -]?(s|secs?|seconds?|mins?|minutes?)\b(?! (?:ago|later|before|after|lap|hand|time))"
-)
-_OFTEN = re.compile(rf"\b(once|twice|thrice|{NUMBER} (?:times?|reps|repetitions))\b")
-_OFTEN_OF_LIMBS = re.compile(
-    r"\b(?:at|more than|once (?:upon|again|more)|all at|for) (?:once|1 time)\b|\bonce (?:upon|again|more)\b"
-)
-_COUNTED: tuple[tuple[str, Counted], ...] = (
-    (r"jumping[ -]?jacks?|star jumps?", "jumping jacks"),
-    (r"jump\w*|leaps?|leaping", "jumps"),
-    (r"hops?|hopping|hopped", "hops"),
-    (r"squat\w*", "squats"),
-    (r"(?<!butt )kicks?|kicking|kicked", "kicks"),
-    (r"punch\w*|jabs?|jabbing|strikes? with (?:the|his|her) fist", "punches"),
-    (r"(?<!a )bow(?:s|ing|ed)?(?! tie)", "bows"),
-    (r"claps?|clapping|clapped", "claps"),
-)
-_MANY = re.compile(
-    rf"(?<!number )\b{NUMBER} (?:(?!(?:and|or|then|with|of|to|the|on|in|at|for|steps?|times?|seconds?|feet|hands)\b)"
-    r"[a-z-]+ ){0,2}"
-    r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|hooks?|uppercuts?"
-    r"|bows?|claps?)\b"
-)
-_COUNTS_ANOTHER = re.compile(
-    r"\b(?:while|every|per|without (?:the |an? )?(?:jump|hop|kick|clap)\w*)\b"
-    rf"|^(?!.*\b(?:jump|hop|squat|kick|punch|bow|clap|leap|jab)\w*\b.* (?:{NUMBER} times|twice|thrice)\b)"
-    rf".*\b(?:{NUMBER} times|twice|thrice) and \w+"
-)
-"""Something else is counted: "pumps the fist three times and jumps"."""
+_SPEEDS = {"km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.447}
+FASTEST = 8.0
+"""m/s that words may say; beyond it the number is left."""
+_COUNTED: tuple[tuple[str, Counted], ...] = tuple((row[0], what) for what, row in TABLES["counted"].items())
 MOST_TIMES = 12
-_TRAVELS = re.compile(
-    r"\b(?:forwards?|ahead|back|backwards?|over|across|along|towards?|around|onto|from|to|far|long|left|right|sideways"
-    r"|through|off|down the|up the|(?:run|walk|jog|skip)\w*)\b"
-)
-"""Words of jumps and hops that go somewhere."""
-_ON_ONE_LEG = re.compile(r"\b(?:on|with) (?:(?:the|his|her|their|its|your) )?(?:left|right) (?:foot|leg)\b")
 _SINGLE = {of: of.removesuffix("es" if of == "punches" else "s") for of in get_args(Counted)}
-_AGES = re.compile(rf"\b{NUMBER}[ -]?years?(?:[ -]old)?\b|\bof {NUMBER}\b(?! (?:steps|met))")
-_BODY = re.compile(
-    r"\b(?:arms?|hands?|heads?|legs?|foot|knees?|wrists?|elbows?|hips?|waist|torso|shoulders?"
-    r"|neck|palms?|body|trunk)\b"
-)
-_HELD = re.compile(r"\bwith (?:the |his |her |their |both |your )?(?:arms|hands)\b")
-"""What is held in some way while the whole body turns."""
-_ELSE = re.compile(
-    r"\b(?:stairs?|staircase|ladder|hill|back and forth|to and fro|zig-?zags?|in circles?|in a"
-    r" (?:\w+ )?circle|around|dances?"
-    r"|danc(?:e|ing)|ballet|salsa|waltz(?:es)?|tango|cha-cha|climb(?:s|ing)?|up (?:the |\w+"
-    r" )?steps|down (?:the |\w+ )?steps"
-    r"|in place|on the spot|while|figure (?:of )?(?:eight|8)|pirouette|diagonally|apart|every)\b"
-)
-"""Words with which a number is no plain way: what is done then is left to the network."""
 _TURNS = {"turn", "rotate", "spin", "pivot", "twirl"}
-_PACES = {
-    "run": 2.8,
-    "jog": 2.2,
-    "sprint": 4.5,
-    "rush": 2.5,
-    "race": 4.0,
-    "march": 1.3,
-    "crawl": 0.45,
-    "sneak": 0.6,
-    "creep": 0.5,
-    "tiptoe": 0.6,
-    "limp": 0.6,
-    "shuffle": 0.5,
-    "stagger": 0.7,
-    "stumble": 0.8,
-    "sidestep": 0.6,
-    "skip": 1.6,
-}
+_PACES: dict[str, float] = TABLES["paces"]
 _RUNS = {"run", "jog", "sprint", "race"}
 """Who does so leans far into a circle of `RADIUS`, which is run only where a side is said."""
 _WALKING = 1.1
@@ -199,31 +112,57 @@ def read_amount(text: str, *, around: bool = False) -> Amount | None:
     text: one action (`motionloom.goals.sequence.split_actions`). around: whether to turn around is a turn of 180
     degrees, as between other actions, where the weights alone turn too little.
     """
-    phrase = in_digits(text)
+    phrase = in_digits(asserted(text))
     verbs = [base for word in re.findall(r"[a-z]+", phrase) if word != "left" and (base := base_of(word))]
-    if _AGES.search(phrase):
-        phrase = _AGES.sub(" ", phrase)
+    if _WORDS["ages"].search(phrase):
+        phrase = _WORDS["ages"].sub(" ", phrase)
     if repetitions := _repetitions(phrase):
         return repetitions
     if not verbs or {kind_of_verb(verb, phrase) for verb in verbs} & {"jump", "fight", "dance"}:
         return None
-    phrase = _STEPS_OFTEN.sub(r"\1 \3 steps\2", phrase)
+    phrase = _WORDS["steps_often"].sub(r"\1 \3 steps\2", phrase)
     return _turn(phrase, verbs, around) or _arc(phrase, verbs) or _steps(phrase, verbs) or _distance(phrase, verbs)
 
 
 def read_seconds(text: str) -> float | None:
     """The seconds that "for ten seconds", "for half a minute" ask for; None without, and beyond a minute."""
-    matches = list(_SECONDS.finditer(in_digits(text)))
+    matches = list(_WORDS["seconds"].finditer(in_digits(text)))
     if len(matches) != 1:
         return None
     seconds = float(matches[0][1]) * (60.0 if matches[0][2].startswith("min") else 1.0)
     return seconds if 0.2 <= seconds <= MOST_SECONDS else None
 
 
+def unread_numbers(text: str, amount: Amount | None, seconds: float | None) -> list[str]:
+    """The quantities in the words of one action that are not kept: "3 km", "15 times".
+
+    amount, seconds: what was read of it (`read_amount`, `read_seconds`); None for nothing.
+    """
+    kind, phrase = (amount.kind if amount else ""), in_digits(text)
+    often = kind in ("count", "steps") or (kind == "turn" and not _WORDS["degrees"].search(phrase))
+    kept = {
+        "length": kind == "way",
+        "angle": kind in ("turn", "arc"),
+        "steps": kind == "steps",
+        "time": seconds is not None,
+        "speed": kind in ("way", "arc") and exact_speed(phrase) is not None,
+        "other": False,
+        "": often or head_said(text) is not None,
+    }
+    return [one[0] for one in _WORDS["quantity"].finditer(phrase) if not kept[one.lastgroup or ""]]
+
+
+def exact_speed(phrase: str) -> float | None:
+    """The metres per second that a phrase says in numbers, up to `FASTEST`; None without."""
+    match = _WORDS["speed"].search(phrase)
+    speed = float(match[1]) * _SPEEDS.get(match[2], 1.0) if match else 0.0
+    return speed if 0.1 <= speed <= FASTEST else None
+
+
 def single_stroke(text: str) -> str:
     """The words of one stroke of what is counted: "a person jumps" of "a person jumps three times"."""
     phrase = in_digits(text, lower=False)
-    less = _OFTEN.sub("", phrase)
+    less = _WORDS["often"].sub("", phrase)
     if less == phrase:
         less = re.sub(rf"\b{NUMBER} (?=(?:[a-z]+ )?[a-z]+)", "", phrase, count=1)
     return " ".join(less.split()).strip(" ,")
@@ -237,8 +176,11 @@ def countable_actions(phrase: str) -> set[Counted]:
 
 def _repetitions(phrase: str) -> Amount | None:
     """Repetitions of one action whose strokes can be counted."""
-    often, many = _OFTEN.findall(_OFTEN_OF_LIMBS.sub(" ", phrase)), list(_MANY.finditer(phrase))
-    if len(often) + len(many) != 1 or _COUNTS_ANOTHER.search(phrase):
+    often, many = (
+        _WORDS["often"].findall(_WORDS["often_of_limbs"].sub(" ", phrase)),
+        list(_WORDS["many"].finditer(phrase)),
+    )
+    if len(often) + len(many) != 1 or _WORDS["counts_another"].search(phrase):
         return None
     kinds = countable_actions(phrase)
     if len(kinds) != 1:
@@ -247,7 +189,7 @@ def _repetitions(phrase: str) -> Amount | None:
     if not 1 <= size <= MOST_TIMES or size != int(size):
         return None
     of = kinds.pop()
-    in_place = of in ("jumps", "hops") and not _TRAVELS.search(_ON_ONE_LEG.sub("", phrase))
+    in_place = of in ("jumps", "hops") and not _WORDS["travels"].search(_WORDS["on_one_leg"].sub("", phrase))
     return Amount("count", size, _side(phrase) or "forward", of=of, in_place=in_place)
 
 
@@ -256,18 +198,22 @@ def _repeat_count(word: str, number: str) -> float:
 
 
 def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
-    if not _TURNS & set(verbs) or _BODY.search(_HELD.sub("", phrase)) or set(verbs) & {"throw", "look"}:
+    if (
+        not _TURNS & set(verbs)
+        or _WORDS["body"].search(_WORDS["held"].sub("", phrase))
+        or set(verbs) & {"throw", "look"}
+    ):
         return None
-    matches, part = list(_DEGREES.finditer(phrase)), _PART_OF_TURN.search(phrase)
-    often = _TURNS_OFTEN.search(phrase) or _OFTEN.search(_OFTEN_OF_LIMBS.sub(" ", phrase))
+    matches, part = list(_WORDS["degrees"].finditer(phrase)), _WORDS["part_of_turn"].search(phrase)
+    often = _WORDS["turns_often"].search(phrase) or _WORDS["often"].search(_WORDS["often_of_limbs"].sub(" ", phrase))
     sizes = len(matches) + bool(part) + bool(often)
-    aside = around and not sizes and _TURNS_ASIDE.search(phrase)
-    if sizes > 1 or not (sizes or aside or (around and _TURNS_ROUND.search(phrase))):
+    aside = around and not sizes and _WORDS["turns_aside"].search(phrase)
+    if sizes > 1 or not (sizes or aside or (around and _WORDS["turns_round"].search(phrase))):
         return None
     if not sizes:
         degrees = 90.0 if aside else 180.0
     elif often:
-        degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _repeat_count(often[1], often[2]))
+        degrees = 360.0 * (float(often[1]) if often.re is _WORDS["turns_often"] else _repeat_count(often[1], often[2]))
     else:
         parts = {"half": 180.0, "0.5": 180.0, "quarter": 90.0, "full": 360.0}
         degrees = float(matches[0][1]) if matches else parts.get(part[1], 270.0)  # type: ignore[index]
@@ -280,20 +226,20 @@ def _turn(phrase: str, verbs: list[str], around: bool) -> Amount | None:
 
 
 def _arc(phrase: str, verbs: list[str]) -> Amount | None:
-    match, side = _ARC.search(phrase) or _CIRCLE.search(phrase), _side(phrase)
-    if match and match.re is _CIRCLE and not (set(verbs) & _RUNS or re.search(r"\b(?:left|right)\b", phrase)):
+    match, side = _WORDS["arc"].search(phrase) or _WORDS["circle"].search(phrase), _side(phrase)
+    if match and match.re is _WORDS["circle"] and not (set(verbs) & _RUNS or re.search(r"\b(?:left|right)\b", phrase)):
         side = side or "left"
-    if not match or not side or not set(verbs) & _GOING or _BODY.search(_HELD.sub("", phrase)):
+    if not match or not side or not set(verbs) & _GOING or _WORDS["body"].search(_WORDS["held"].sub("", phrase)):
         return None
     backward = _is_backward(phrase)
-    size = match[1] if match.re is _ARC else "full"
+    size = match[1] if match.re is _WORDS["arc"] else "full"
     degrees = 90.0 if size == "quarter" else 180.0 if size in ("half", "semi", "0.5") else 360.0
     return Amount("arc", degrees, side, speed=_pace(phrase, verbs), backward=backward)
 
 
 def _steps(phrase: str, verbs: list[str]) -> Amount | None:
-    matches = list(_STEPS.finditer(phrase))
-    if len(matches) != 1 or not set(verbs) & _STEPPING or _ELSE.search(phrase):
+    matches = list(_WORDS["steps"].finditer(phrase))
+    if len(matches) != 1 or not set(verbs) & _STEPPING or _WORDS["else"].search(phrase):
         return None
     size, direction = matches[0][2] or "", _direction(phrase, aside=True)
     count = float(matches[0][1]) if matches[0][1] else 1.0
@@ -309,9 +255,12 @@ def _steps(phrase: str, verbs: list[str]) -> Amount | None:
 
 
 def _distance(phrase: str, verbs: list[str]) -> Amount | None:
-    matches, direction = list(_WAY.finditer(phrase)), _direction(phrase, aside=bool({"move", "step"} & set(verbs)))
+    matches, direction = (
+        list(_WORDS["way"].finditer(phrase)),
+        _direction(phrase, aside=bool({"move", "step"} & set(verbs))),
+    )
     going = [verb for verb in verbs if verb in _GOING]
-    if len(matches) != 1 or direction is None or not going or _ELSE.search(phrase):
+    if len(matches) != 1 or direction is None or not going or _WORDS["else"].search(phrase):
         return None
     if set(verbs) - set(going) - {"stop", "halt", "track", "return", "keep", "continue"} - {"open", "place"}:
         return None
@@ -328,6 +277,8 @@ def _pace(phrase: str, verbs: list[str]) -> float:
         pace *= 0.65
     elif _direction(phrase, aside=False) in ("left", "right"):
         pace = min(pace, 0.7)
+    if (exact := exact_speed(phrase)) is not None:
+        return exact
     if _is_slow(phrase):
         return 0.65 * pace
     return 1.35 * pace if re.search(r"\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b", phrase) else pace
@@ -380,16 +331,7 @@ SLOWEST = 0.5
 """Share of the pace of the words that a way may be slowed to for a longer time; beyond it the person stands still."""
 TURN_OFF, WAY_OFF = 10.0, 0.1
 """Degrees (10 of a full turn), and share of a way, by which a motion may miss what was read."""
-STROKES: dict[Counted, float] = {
-    "jumps": 1.5,
-    "hops": 0.9,
-    "squats": 2.2,
-    "kicks": 1.8,
-    "punches": 1.6,
-    "bows": 2.5,
-    "claps": 0.5,
-    "jumping jacks": 1.0,
-}
+STROKES: dict[Counted, float] = {what: row[1] for what, row in TABLES["counted"].items()}
 """Seconds of one stroke; how often they come is measured, and tried again (`motionloom.tasks.worded`)."""
 CHAINED = 1.4
 """Seconds from which on a stroke is a segment of its own; quicker ones follow each other in one."""

@@ -10,55 +10,24 @@ from collections.abc import Sequence
 
 from motionloom.goals.amounts import read_seconds
 from motionloom.goals.numerals import SMALL_NUMBERS, in_digits
-from motionloom.goals.verbs import MOODS, NOUNS_AFTER, base_of, finite, mood_of, subject_of, verb_of
+from motionloom.goals.verbs import (
+    MOODS,
+    NOUNS_AFTER,
+    TABLES,
+    base_of,
+    finite,
+    mood_of,
+    subject_of,
+    verb_of,
+    word_patterns,
+)
+
+_WORDS = word_patterns("ellipsis")
 
 _LIMB = r"(?:ones?|arms?|hands?|legs?|foot|feet|knees?|fists?|sides?|elbows?|shoulders?|way)"
 _OFTEN = r"(?:once|twice|thrice|(?:[a-z]+|\d+) (?:more )?(?:times?|reps|repetitions))"
-_ALONE = re.compile(
-    rf"(?:(?P<often>{_OFTEN})(?: |$))?"
-    rf"(?:(?P<number>\d+|{'|'.join(SMALL_NUMBERS)})(?: more)?(?: (?:degrees?|steps?|meters?|metres?|m))?(?: |$))?"
-    r"(?:(?:with|to|on|over to|towards?) )?"
-    r"(?:(?:the |his |her |their |its |your |my )?(?P<side>left|right|other|opposite)\b"
-    rf"(?: {_LIMB})?(?: goes up)?|(?P<where>forwards?|backwards?|back|up|down)\b|(?P<both>both)\b(?: {_LIMB})?)?"
-    r"(?: ?(?P<pace>(?:more )?(?:slowly|quickly)|faster|slower))?"
-    rf"(?: (?P<later>{_OFTEN}))?(?: ?(?:again|too|as well))?",
-    re.IGNORECASE,
-)
-"""Words that only say what is different from the part before: "twice with the left", "three back", "backwards"."""
-_REPEATS = re.compile(
-    r"(?:repeat|do)(?: (?:it|this|that|(?:this|that|the) (?:motion|movement|action|exercise)|(?:exactly )?the same"
-    r"(?: thing| motion| movement)?))?(?: again)?(?: (?:on|with|to|for|in) (?:the|his|her|their|its|your|my) "
-    rf"(?P<side>left|right|other|opposite)(?: {_LIMB})?)?(?: (?P<often>{_OFTEN}))?(?: again)?"
-    r"|(?:switch|change|swap)(?: (?:legs|arms|hands|feet|sides|knees)| to (?:the|his|her|their|its|your|my) "
-    rf"(?P<to>left|right|other|opposite)(?: {_LIMB})?)",
-    re.IGNORECASE,
-)
-"""The part before once more, or its other side."""
-_WHERE = re.compile(
-    r"\b(?:to (?:the|his|her|their|its|your|my) (?:left|right)|(?:left|right)(?! \w)|forwards?|ahead|backwards?|back)\b"
-)
 _PACE = re.compile(r"\b(?:very )?(?:slowly|quickly|fast|briskly|leisurely)\b", re.IGNORECASE)
-_THING_ALONE = re.compile(r"(?:a|an|one|another|two|three) (?:[a-z-]+ ){0,2}[a-z-]+", re.IGNORECASE)
-_ENDS = re.compile(
-    r"straighten(?: (?:back )?up)?(?: again)?"
-    r"|(?=.*\b(?:back|again|right|straight)\b)"
-    r"(?:come|go|pop) (?:right |straight |quickly |slowly )?(?:back )?up(?: again)?",
-    re.IGNORECASE,
-)
-"""The end of bowing, bending, ducking."""
-_BENT = re.compile(r"\b(?:bend|bow|duck|stoop|squat)|\btouch\w* (?:\w+ )?toes\b", re.IGNORECASE)
-_STRAIGHTENS = re.compile(r"(?:slowly )?(?:come|go) (?:slowly )?up(?: slowly)?", re.IGNORECASE)
-_RETURNS = re.compile(
-    r"(?:slowly )?(?:return|come back|go back|get back|roll up)(?: slowly| back)* (?:in)?to "
-    r"(?:(?:an?|the|his|her|their|your) )?"
-    r"(?:standing|upright|start(?:ing)?|initial|original|neutral|first|normal)(?: (?:position|pose|posture|stance))?",
-    re.IGNORECASE,
-)
-_LIES = re.compile(r"\b(?:lies?|lying|lay)\b", re.IGNORECASE)
-_LOW = re.compile(r"\b(?:sits?|sat|seat|kneel\w*|knelt|lies?|lying|lay|crouch\w*)\b", re.IGNORECASE)
 SQUATS = re.compile(r"\b(?:squat|lunge)", re.IGNORECASE)
-_RISES_AGAIN = re.compile(r"(?:stand|get|push|rise) (?:right |straight )?(?:back )?up(?: again)?", re.IGNORECASE)
-"""The end of a squat, which is no squat without."""
 STAYS = re.compile(
     r"(?:stay|remain) (?:there|low|down|still|put|like (?:that|this)|that way|in (?:that|this|the) po(?:se|sition))"
     r"|hold(?: (?:it|that|this|still|(?:the|this|that) po(?:se|sition)))?(?: briefly| there)?(?= *$| for )",
@@ -66,61 +35,7 @@ STAYS = re.compile(
 )
 WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
 """Who stays somewhere after these stands still, which is an action of its own."""
-_UP_AGAIN = re.compile(
-    r"(?:get|come|go|rise) (?:right |straight )?(?:back )?"
-    r"(?:up|(?:on)?to (?:his|her|their|your) feet|on (?:his|her|their|your) feet)(?: again)?",
-    re.IGNORECASE,
-)
-_BACK_AGAIN = re.compile(r"(walk|run|jog|come|go) back\b.*|return\b.*", re.IGNORECASE)
-_VESSEL = re.compile(
-    r"\bfrom ((?:an?|the|his|her|their|its|your|my) (?:\w+ )?(?:bottle|glass|cup|mug|can|bowl))\b", re.IGNORECASE
-)
-_OBJECT = re.compile(
-    r"(?<!with )(?<!\bin )(?<!\bon )(?<!of )(?<!to )(?<!from )(?<!at )(?<!over )(?<!by )(?<=\w )"
-    r"((?:an?|the|his|her|their|its|your|my|both|one|some|another) (?:[a-z-]+ ){0,2}?[a-z-]+"
-    r"|something(?: heavy| light| big| small)?)"
-    r"(?=$|,| (?:from|off|on|onto|with|to|in|into|at|over|under|above|behind|against|out|up|down|as|and|high|again"
-    r"|sideways|slowly)\b)",
-    re.IGNORECASE,
-)
-"""A thing that something is done with: what "it" and "them" mean behind it."""
-_IT = re.compile(
-    r"^((?:\w+ly )?\w+(?: (?:from|at|with|on|over|into|to|through|under|for))?) (?:it|them)\b"
-    r"(?: back(?= (?:down|on|in|to)\b))?"
-)
-_NO_OBJECT = re.compile(
-    r"(?:the|his|her|their|its|your|my|an?|some|one) (?:few |couple of )?"
-    r"(?:floor|ground|left|right|front|back|side|steps?|moments?|seconds?|while|bit|times?|met(?:er|re)s?|way)$",
-    re.IGNORECASE,
-)
-_STAIRS = re.compile(r"\bstairs?\b|\bstaircase\b", re.IGNORECASE)
-_TURNED = re.compile(r"\bturn(?:s|ed)? (?:around|round|about|back)\b", re.IGNORECASE)
-_BARE_TURN = re.compile(r"\b(turn(?:s|ed)?)(?= *$| (?:slowly|quickly|suddenly|again)$)", re.IGNORECASE)
-_GOES_AWAY = re.compile(
-    r"(?:walk|run|jog|go|come|sprint|stride|stroll|march) (?:\w+ly )?(?:away|back|off|out)\b|leave\b"
-)
-"""What somebody does who has turned around to do it."""
-_SEATED = re.compile(r"\b(?:sits?|sat|seat)\b", re.IGNORECASE)
-_SITS = re.compile(
-    r"(?:\w+ly )?sit(?: down)? with (?:(?:the|his|her|their|its|your|my) )?(?:legs crossed|crossed legs)", re.IGNORECASE
-)
-_SEATS = re.compile(r"\b(chair|bench|sofa|couch|stool|armchair|throne)\b")
-_CROUCHED = re.compile(r"\b(?:crouch|squat|kneel|duck)\w*|\bknelt\b", re.IGNORECASE)
 _ON_THE_FLOOR = re.compile(r"\b(?:floor|ground)\b", re.IGNORECASE)
-_CYCLES = (
-    (r"(?:\w+ly )?(?:sit|kneel|lie|crouch|squat|bend|get down|take a seat)\b", r".*\b(?:up|upright|standing)\b"),
-    (r".*\blunge\b", r"(?:\w+ly )?stand up\b"),
-    (r"(?:raise|lift|put)\b", r"(?:\w+ly )?(?:lower|drop)\b|(?:put|bring|take)\b.*\bdown\b"),
-    (r"(?:stand|get|rise)\b.*\bup\b|stand\b", r"(?:\w+ly )?(?:sit|kneel|lie|crouch)\b"),
-)
-"""Patterns of two actions of which the second undoes the first, verbs in their bases."""
-_CYCLES_BEHIND_A_COMMA = (
-    (r".*\bforwards?\b", r".*\bback(?:wards?)?\b"),
-    (r".*\bup\b", r".*\bdown\b"),
-    (r".*\bleft\b", r".*\bright\b"),
-    (r".*\bright\b", r".*\bleft\b"),
-)
-"""Those of which both are done again only where a comma is before the number: "left, then right, twice"."""
 _OTHER = {"left": "right", "right": "left"}
 _REACH = 20
 """Parts that words may refer back over."""
@@ -138,8 +53,8 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
             continue
         named = subject_of(part)
         rest = part.removeprefix(named).strip()
-        if _GOES_AWAY.match(in_base(rest)):
-            result[-1] = _BARE_TURN.sub(r"\1 around", result[-1])
+        if _WORDS["goes_away"].match(in_base(rest)):
+            result[-1] = _WORDS["bare_turn"].sub(r"\1 around", result[-1])
         before = result[-1]
         if again := _again(result, part):
             result += again
@@ -154,11 +69,15 @@ def resolve_ellipsis(parts: Sequence[str]) -> list[str]:
 def _again(parts: Sequence[str], part: str) -> list[str]:
     """The action before, with its end if that is a part of its own, once more or on its other side; else empty."""
     alone = re.sub(r"^(?:then|and) ", "", part.removeprefix(subject_of(parts[0])).strip().replace(",", ""))
-    again = _REPEATS.fullmatch(in_base(alone))
+    again = _WORDS["repeats"].fullmatch(in_base(alone))
     if not again:
         return []
     actions = [one for one in parts if not _stays(one)] or list(parts)
-    block = list(actions[-2:] if len(actions) > 1 and _are_reverse(actions[-2], actions[-1], _CYCLES) else actions[-1:])
+    block = list(
+        actions[-2:]
+        if len(actions) > 1 and _are_reverse(actions[-2], actions[-1], TABLES["cycles"]["always"])
+        else actions[-1:]
+    )
     side = (again["side"] or again["to"] or "").lower()
     switched = side in ("other", "opposite") or bool(re.match("switch|change|swap", in_base(alone)) and not side)
     if switched or (side in _OTHER and any(re.search(rf"\b{_OTHER[side]}\b", one) for one in block)):
@@ -193,10 +112,10 @@ def repeat_cycles(parts: Sequence[str], most: int) -> list[str]:
     each other's reverse, or too many would come of it.
     """
     found = re.search(rf"(?:^|,? )({_OFTEN})(?: each(?: \w+)?)?$", parts[-1], re.IGNORECASE) if len(parts) > 1 else None
-    if not found or _REPEATS.fullmatch(in_base(parts[-1].removeprefix(subject_of(parts[0])).strip())):
+    if not found or _WORDS["repeats"].fullmatch(in_base(parts[-1].removeprefix(subject_of(parts[0])).strip())):
         return []
     resolved = resolve_ellipsis([*parts[:-1], parts[-1][: found.start()]])
-    cycles = _CYCLES + _CYCLES_BEHIND_A_COMMA if "," in found[0] else _CYCLES
+    cycles = TABLES["cycles"]["always"] + TABLES["cycles"]["comma"] if "," in found[0] else TABLES["cycles"]["always"]
     times = _times(found[1])
     if times < 2 or len(resolved) < 2 or len(resolved) - 2 + 2 * times > most:
         return []
@@ -208,15 +127,15 @@ def repeat_cycles(parts: Sequence[str], most: int) -> list[str]:
 def _only_ends(before: str, rest: str) -> bool:
     """Whether something only ends, or keeps, what was done before."""
     rest = in_base(rest)
-    if _ENDS.fullmatch(rest):
-        return not _SEATED.search(before)
-    if _STRAIGHTENS.fullmatch(rest) and _BENT.search(before):
+    if _WORDS["ends"].fullmatch(rest):
+        return not _WORDS["seated"].search(before)
+    if _WORDS["straightens"].fullmatch(rest) and _WORDS["bent"].search(before):
         return True
     if _stays(before):
         return False
-    if _RETURNS.fullmatch(rest):
-        return not _LOW.search(before)
-    if SQUATS.search(before) and _RISES_AGAIN.fullmatch(rest):
+    if _WORDS["returns"].fullmatch(rest):
+        return not _WORDS["low"].search(before)
+    if SQUATS.search(before) and _WORDS["rises_again"].fullmatch(rest):
         return True
     first = verb_of(before.removeprefix(subject_of(before)).strip(), mood_of(before))
     return (
@@ -227,10 +146,10 @@ def _only_ends(before: str, rest: str) -> bool:
 def _with_repeated_words(before: str, part: str) -> str:
     """The sentence before with what the part says differently: a side, a thing, a number, a way; else empty."""
     alone = re.sub(r"^(?:then|and) ", "", part.removeprefix(subject_of(before)).strip().replace(",", ""))
-    found = _ALONE.fullmatch(alone)
+    found = _WORDS["alone"].fullmatch(alone)
     if found and any(found.groupdict().values()):
         return _with_differences(before, found)
-    if _THING_ALONE.fullmatch(alone) and not any(base_of(word) in NOUNS_AFTER for word in alone.split(" ")):
+    if _WORDS["thing_alone"].fullmatch(alone) and not any(base_of(word) in NOUNS_AFTER for word in alone.split(" ")):
         ends = [match.end() for match in re.finditer(r"[a-z]+", before) if base_of(match[0]) in NOUNS_AFTER]
         if ends:
             return f"{before[: ends[0]]} {alone}"
@@ -250,16 +169,16 @@ def _with_differences(before: str, found: re.Match[str]) -> str:
     elif side and re.search(rf"\b{_OTHER[side]}\b", before):
         before = re.sub(rf"\b{_OTHER[side]}\b", side, before)
     elif side and not re.search(rf"\b{side}\b", before):
-        if not _WHERE.search(before):
+        if not _WORDS["where"].search(before):
             return ""
-        before = _WHERE.sub(f"to the {side}", before, count=1)
+        before = _WORDS["where"].sub(f"to the {side}", before, count=1)
     elif where in ("up", "down"):
         if not re.search(r"\b(?:up|down)\b", before):
             return ""
         before = re.sub(r"\b(?:up|down)\b", where, before, count=1)
     elif where:
         where = "backwards" if where.startswith("back") else where
-        before = _WHERE.sub(where, before, count=1) if _WHERE.search(before) else f"{before} {where}"
+        before = _WORDS["where"].sub(where, before, count=1) if _WORDS["where"].search(before) else f"{before} {where}"
     elif found["both"]:
         before, changed = re.subn(r"\bthe (?:left|right) (arm|hand|leg|fist|knee)\b", r"both \1s", before)
         if not changed:
@@ -281,32 +200,33 @@ def _mirrored(text: str) -> str:
 def _rephrased(parts: Sequence[str], rest: str) -> str:
     """The action in words that make sense without the parts before."""
     mood, before, plain = mood_of(rest) or "third", parts[-1], in_base(rest)
-    if re.fullmatch(r"(?:\w+ly )?sit (?:back )?up(?: again| straight)?", plain) and _LIES.search(before):
+    if re.fullmatch(r"(?:\w+ly )?sit (?:back )?up(?: again| straight)?", plain) and _WORDS["lies"].search(before):
         return f"{form_of('sit', mood)} on the floor"
     low = next((one for one in reversed(parts) if not _stays(one)), before)
-    if _RETURNS.fullmatch(plain) or (
-        plain == "return" and (SQUATS.search(low) or _BENT.search(low) or _LOW.search(low))
+    if _WORDS["returns"].fullmatch(plain) or (
+        plain == "return" and (SQUATS.search(low) or _WORDS["bent"].search(low) or _WORDS["low"].search(low))
     ):
         return f"{form_of('stand', mood)} up"
-    back = _BACK_AGAIN.fullmatch(plain)
-    if back and (on := re.fullmatch(r"\w+ back (up|down)", plain)) and any(map(_STAIRS.search, parts)):
+    back = _WORDS["back_again"].fullmatch(plain)
+    if back and (on := re.fullmatch(r"\w+ back (up|down)", plain)) and any(map(_WORDS["stairs"].search, parts)):
         return f"{form_of('walk', mood)} {on[1]} the stairs"
-    if back and _TURNED.search(before):
+    if back and _WORDS["turned"].search(before):
         moves = (back[1] or "walk").lower()
         return f"{form_of('walk' if moves in ('come', 'go') else moves, mood)} forward"
-    if (_UP_AGAIN.fullmatch(plain) or _ENDS.fullmatch(plain)) and (_SEATED.search(before) or _CROUCHED.search(before)):
+    if (_WORDS["up_again"].fullmatch(plain) or _WORDS["ends"].fullmatch(plain)) and (
+        _WORDS["seated"].search(before) or _WORDS["crouched"].search(before)
+    ):
         return f"{form_of('stand', mood)} up{' from the floor' if _ON_THE_FLOOR.search(before) else ' again'}"
     if STAYS.match(plain):
         return rest
-    if _SITS.fullmatch(plain) and (seats := [seat for part in parts for seat in _SEATS.findall(part.lower())]):
-        return f"{rest} on the {seats[-1]}"
     named = [
-        [one[1] for one in _OBJECT.finditer(part) if not _NO_OBJECT.match(one[1])] + _VESSEL.findall(part)
+        [one[1] for one in _WORDS["object"].finditer(part) if not _WORDS["no_object"].match(one[1])]
         for part in reversed(parts)
     ]
     things = next(filter(None, named), [""])
     thing = re.sub(r"^(?:an?|some|another|one)\b", "the", things[0], flags=re.IGNORECASE)
-    return _IT.sub(rf"\1 {thing}", rest, count=1) if thing else rest
+    thing = re.sub(r" (?:\w+ly|\w+hand|overhead|hard|far|away)$", "", thing)
+    return _WORDS["it"].sub(rf"\1 {thing}", rest, count=1) if thing else rest
 
 
 def in_base(rest: str) -> str:

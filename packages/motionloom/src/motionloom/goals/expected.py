@@ -6,13 +6,14 @@ one is selected that shows the most (`motionloom.tasks.best`).
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from motionloom.goals.amounts import countable_actions
-from motionloom.goals.verbs import base_of, in_plainer_words, kind_of_verb
+from motionloom.goals.tumbling import FLAT, faces_up, log_roll, pitch
+from motionloom.goals.verbs import FALL_WAYS, asserted, base_of, in_plainer_words, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Side, count
 from motionloom.kinematics.gestures import (
     foot_lifts,
@@ -24,6 +25,7 @@ from motionloom.kinematics.gestures import (
     seats,
     single_foot_hops,
     torso_inclination,
+    true_spans,
     wrist_swings,
 )
 from motionloom.kinematics.physics import (
@@ -39,7 +41,10 @@ from motionloom.kinematics.physics import (
     travel,
     turn,
 )
+from motionloom.kinematics.stairs import FLIGHT
 from motionloom.motion import heading
+
+_WORDS = word_patterns("expected")
 
 Check = Callable[[Array, float], bool]
 """(positions (frames, 22, 3) metres, frames per second) to whether something is done."""
@@ -52,7 +57,7 @@ _TURNS, _TURNS_ROUND, _SPINS = np.radians(25), (np.radians(120), np.radians(240)
 _LOW, _DOWN, _UP = 0.85, 0.4, 0.85
 """Leg lengths of the pelvis over the feet: below it somebody crouches, kneels or sits; over the floor of somebody who
 sits or lies on it; over the feet of somebody who is up."""
-_UPRIGHT, _FLAT = np.radians(50), np.radians(60)
+_UPRIGHT = np.radians(50)
 """Inclination of the trunk below which somebody is upright, above which somebody lies."""
 _BENDS, _LEANS = np.radians(30), np.radians(8)
 """Inclination of the trunk of who bends, and its sideways part of who leans to a side."""
@@ -65,55 +70,17 @@ _LEAPS, _CHAIR = 0.2, 0.45
 """Metres that the pelvis of who falls rises by at most, and that the feet are over the floor of who lies."""
 _CROSSED = 0.27
 """Metres from a wrist to the other arm's elbow of who has crossed the arms."""
+_FLOATS = 0.1
 _FOOT, _FLIGHT = 0.15, 0.34
 """Metres that a foot is raised by, and of two stairs."""
-_GAIT = (
-    r"\b(?:walk|run|jog|sprint|march|stroll|stride|skip|tiptoe|sneak|crawl|limp|shuffle|sidestep|strafe|hurr|step"
-    r"|stumbl)"
-    r"(?:s|es|ning|ging|ing|ting|ping|ed|ned|ped|ies|ying)?\b|\bpac(?:es|ing|ed)\b|^pace\b"
-)
-_BACKWARDS = r"\b(?:backwards?|in reverse|steps? back|back(?:s|ing) (?:up|away)|few steps back)\b|^back (?:up|away)\b"
-_IN_PLACE = (
-    r"\b(?:in place|on (?:the|one) spot|treadmill|without leaving the (?:place|spot)"
-    r"|(?:jump|hop|bounc)\w* up and down)\b"
-)
-_STAYS_THERE = r"\b(?:roll|swing|slip|stretch)\w*\b.*\b(?:shoulder|arm|leg|head|backward)|\btoes\b"
-"""What is done backwards on the spot."""
-_WAY_BACK = (
-    r"\b(?:walks? back|walking back|comes? back|returns?)\b(?! (?:and forth|up)\b)"
-    r"(?! to (?:an? |the |his |her |their )?(?:stand|upright|start|initial|original|neutral|normal))"
-)
-_NO_TURN = r"\b(?:without turning|(?:still )?facing (?:forwards?|ahead|the front))\b"
-_NO_THROW = (
-    r"\b(?:punch|kick|jab|hook|uppercut)"
-    r"|\bthrow\w* (?:up )?(?:both|the|his|her|their|its|your|my) (?:\w+ )?(?:arm|hand|head)s?\b"
-)
-_TUMBLES = (
-    r"\b(?:cartwheel|handstand|somersault|handspring|(?:back|front) ?flip|flips? (?:over|backwards?|forwards?)"
-    r"|rolls? (?:forwards?|backwards?|on the)|(?:forward|backward|shoulder) roll)"
-)
-_SEAT = r"\b(?:chair|seat|bench|stool|sofa|couch)\b"
-_FLOOR = r"\b(?:floor|ground|grass|cross-?legged|crossed legs|legs crossed)\b"
-_SIDE_BEND = (
-    r"\b(?:lean|bend|tilt)(?:s|ing|ed)? (?:\w+ )?(?:sideways )?(?:over )?to(?:wards?)? "
-    r"(?<!head to )(?:the|his|her|their|its|your|my) (left|right)(?! (?:foot|leg|knee|toe|shoe|hand|ankle))"
-)
-_STANDS = (
-    r"\b(?:rais|lift|wav|clap|point|nod|salut|cheer|drink|eat|look|cross|fold|stretch|shrug|talk|gestur|beckon|yawn|laugh"
-    r"|cry|cries|smil|sing|shout|scratch|hold|knock|brush)(?:e?s|ed|ing|ging|ding|ping)?\b"
-)
-_NOT_STANDING = (
-    r"\b(?:sit|seat|lie|lay|kneel|knelt|crouch|squat|floor|ground|bed|chair|knee|bend|bent|lean|stair|ladder|walk|leg|foot|feet"
-    r"|toe|step|circle|it\b|box|heavy|weight|barbell|dumbbell|forward|back|shoe|tired|exhaust|horse|baby|plank|push-?up)"
-)
-"""Gestures of who stands, and words of somebody who may do something else."""
-_FALLS = (
-    r"(?<!\bwithout )(?<!\bnot )(?<!\balmost )(?<!\bnearly )(?<!n't )\b(?:falls?|falling|fell|collapses?|collapsing)\b"
-    r"(?! (?:asleep|behind|back|in love|silent)\b)"
-)
-_ARMS_OUT = r"\barms (?:\w+ )?(?:out\b|spread|outstretched|stretched)(?! (?:of|up|over|above))"
-_LEVEL = r"\b(?:shoulders?|chest|t-?pose|sides?|sideways|out|front)\b"
+_DET = r"(?:the|his|her|their|its|your|my)"
+_TIPS = 0.1
+"""Metres of the neck beyond the feet, on the average of half a second, of who falls to a side."""
 _LIMB = r"\b(?:arm|hand|leg|foot|fist|knee|shoulder|elbow)s?\b"
+
+
+FLOOR = "the floor under the feet"
+"""What is asked of every motion whose words do not climb."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +98,7 @@ class _Phrase:
 
     text: str
 
-    def has(self, *patterns: str) -> bool:
+    def has(self, *patterns: str | re.Pattern[str]) -> bool:
         """Whether each of some patterns is in it."""
         return all(re.search(pattern, self.text) for pattern in patterns)
 
@@ -143,8 +110,13 @@ class _Phrase:
 
     @property
     def side(self) -> Side:
-        """The one side that it names."""
-        sides = set(re.findall(r"\b(left|right)\b", self.text))
+        """The one side that it names, of a way, or of a limb."""
+        behind = (
+            r"(?:wards?)?\b(?=$|[,.]| (?:side(?! of)|and|then|with|while|as|at|by|for|again|twice|in|into|\w+ly|\d+)\b)"
+        )
+        sides = set(
+            re.findall(rf"\b(left|right)(?:{behind}|(?= (?:\w+ )?{_LIMB[2:]}|[ -]?(?:punch|kick|hook|jab)))", self.text)
+        )
         return "" if len(sides) != 1 else "left" if "left" in sides else "right"
 
 
@@ -160,19 +132,33 @@ def share_met(text: str, positions: np.ndarray, fps: float) -> float:
 def missing(text: str, positions: np.ndarray, fps: float) -> list[str]:
     """The names of what the words of one action say plainly and a motion does not show; arguments as of `share_met`."""
     p = np.asarray(positions, dtype=np.float64)
-    return [one.name for one in expectations_of(text) if not one.check(p, fps)]
+    names = [one.name for one in expectations_of(text) if not one.check(p, fps)]
+    return names + [FLOOR] * bool(floating(p, fps) and not climbs([text]))
+
+
+def floating(p: Array, fps: float) -> list[tuple[int, int]]:
+    """Half-open ranges of frames, `FLIGHT` or longer, in which no joint is within 10 cm of the floor y = 0.
+
+    p: (frames, 22, 3) metres. A seat in the air bears nobody.
+    """
+    return [(a, b) for a, b in true_spans(p[..., 1].min(axis=1) > _FLOATS) if b - a > FLIGHT * fps]
+
+
+def climbs(texts: Iterable[str]) -> bool:
+    """Whether some words are of stairs, of a ladder, of climbing, or of something that people are on or hang from."""
+    return any(_WORDS["climb"].search(text.lower()) for text in texts)
 
 
 def asks_for_rest(text: str) -> bool:
     """Whether somebody is to stand, sit, lie or wait."""
-    return "state" in _Phrase(text.lower()).kinds
+    return "state" in _Phrase(asserted(text)).kinds
 
 
 def expectations_of(text: str) -> list[Expectation]:
     """What can be checked of the words of one action, and of common words for its rare ones."""
     found: dict[str, Check] = {}
     for words in dict.fromkeys((in_plainer_words(text), text)):
-        phrase = _Phrase(words.lower())
+        phrase = _Phrase(asserted(words))
         limb: Side = phrase.side if phrase.has(_LIMB) else ""
         way: Side = "" if limb else phrase.side
         parts = _repeated(phrase, limb), _ways(phrase, way), _postures(phrase), _arms(phrase, limb), _whole_body(phrase)
@@ -207,24 +193,30 @@ def _repeated(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
 
 
 def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
-    sign, turns = (1 if side == "left" else -1), phrase.has(r"\b(?:turn|pivot|rotat)") and not phrase.has(_NO_TURN)
+    sign, turns = (
+        (1 if side == "left" else -1),
+        phrase.has(r"\b(?:turn|pivot|rotat)") and not phrase.has(_WORDS["no_turn"]),
+    )
     if phrase.has(r"\bturn\w* (?:\w+ )?head\b"):
         return
-    if phrase.has(_NO_TURN):
+    if phrase.has(_WORDS["no_turn"]):
         yield "facing one way", lambda p, fps: abs(turn(p)) < _FACES
     if phrase.has(r"\b(?:spin|twirl|pirouet)"):
         yield "a full turn", lambda p, fps: float(np.abs(np.diff(smooth(heading(p), 3))).sum()) > _SPINS
     elif turns and side and not phrase.has(_LIMB):
         yield f"a turn to the {side}", lambda p, fps: sign * turn(p) > _TURNS
-    elif turns and phrase.has(r"\b(?:around|round|about|180|other (?:way|direction)|opposite)\b"):
+    elif turns and phrase.has(
+        r"\b(?:turn|pivot|rotat)\w* (?:\w+ly |right |all the way )?(?:(?:around|round|about)(?! (?:the|an?|corners?)\b)"
+        r"|180|to (?:face )?the (?:other|opposite)|the other way|in the opposite|to look (?:behind|back))"
+    ):
         yield "a half turn", lambda p, fps: _TURNS_ROUND[0] < abs(turn(p)) < _TURNS_ROUND[1]
     elif turns and phrase.has(r"\baway\b"):
         yield "a turn", lambda p, fps: abs(turn(p)) > 2 * _TURNS
-    if phrase.has(_IN_PLACE):
+    if phrase.has(_WORDS["in_place"]):
         yield "staying in place", lambda p, fps: float(np.hypot(*_from_start(p).max(axis=0))) < 2 * _GOES
-    elif phrase.has(_WAY_BACK) and not phrase.has(_BACKWARDS):
+    elif phrase.has(_WORDS["way_back"]) and not phrase.has(_WORDS["backwards"]):
         yield (
-            "a way back",
+            "coming back to the start",
             lambda p, fps: float(np.linalg.norm(p[-1, 0, [0, 2]] - p[0, 0, [0, 2]])) < travel(p, fps) / 2,
         )
     elif phrase.has(r"\bstairs?\b|\bstaircase\b|\bladder\b"):
@@ -233,35 +225,40 @@ def _ways(phrase: _Phrase, side: Side) -> Iterator[_Named]:
             ("a way down" if falls else "a way up"),
             lambda p, fps: (p[-1, 0, 1] - p[0, 0, 1]) * (1, -1)[falls] > _FLIGHT,
         )
-    elif _travels(phrase) and not turns and not phrase.has(_FALLS):
+    elif _travels(phrase) and not turns and not phrase.has(_WORDS["falls"]):
         yield _direction(phrase, side, sign)
-    if phrase.has(_GAIT, r"\bin an? (?:[\w-]+ ){0,2}circle\b"):
+    if phrase.has(_WORDS["gait"], r"\bin an? (?:[\w-]+ ){0,2}circle\b"):
         yield "a circle", lambda p, fps: abs(turn(p)) > _CIRCLES and (not side or sign * turn(p) > 0)
-    if side and phrase.has(_GAIT) and phrase.has(r"\b(?:curv|veer|arc)"):
+    if side and phrase.has(_WORDS["gait"]) and phrase.has(r"\b(?:curv|veer|arc)"):
         yield f"a curve to the {side}", lambda p, fps: sign * turn(p) > _CURVES
-    if side and phrase.has(_GAIT, r"\bdiagonal"):
+    if side and phrase.has(_WORDS["gait"], r"\bdiagonal"):
         yield f"a way aside to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES / 2
     yield from _paces(phrase)
 
 
 def _travels(phrase: _Phrase) -> bool:
-    return phrase.has(_GAIT) or (phrase.has(_BACKWARDS) and not phrase.has(_STAYS_THERE))
+    return phrase.has(_WORDS["gait"]) or (phrase.has(_WORDS["backwards"]) and not phrase.has(_WORDS["stays_there"]))
 
 
 def _direction(phrase: _Phrase, side: Side, sign: int) -> _Named:
-    if phrase.has(_BACKWARDS):
+    if phrase.has(_WORDS["backwards"]):
         return "a way backwards", lambda p, fps: displacement(p, fps).forward < -_GOES
-    if side and phrase.has(r"\b(?:side|strafe|shuffl|over to)"):
+    if side and phrase.has(r"\b(?:side|strafe|shuffl|over to the (?:left|right))"):
         return f"a way to the {side}", lambda p, fps: sign * displacement(p, fps).left > _GOES
     if phrase.has(r"\b(?:forwards?|ahead)\b") and not side:
         return "a way forward", lambda p, fps: displacement(p, fps).forward > _GOES
     short = phrase.has(r"\bstep|\b(?:stand|start|stop|wait)")
-    return "a way", lambda p, fps: travel(p, fps) > (_GOES if short else min(max(_GOES, _PACE * len(p) / fps), _FAR))
+    return (
+        "moving from the spot",
+        lambda p, fps: travel(p, fps) > (_GOES if short else min(max(_GOES, _PACE * len(p) / fps), _FAR)),
+    )
 
 
 def _paces(phrase: _Phrase) -> Iterator[_Named]:
     walks = phrase.has(r"\b(?:walk|stroll|stride)")
-    runs = phrase.has(r"\b(?:run|runs|running|sprint\w*)\b(?!-up)") and not phrase.has(f"{_BACKWARDS}|{_IN_PLACE}")
+    runs = phrase.has(r"\b(?:run|runs|running|sprint\w*)\b(?!-up)") and not (
+        phrase.has(_WORDS["backwards"]) or phrase.has(_WORDS["in_place"])
+    )
     if runs and not walks:
         yield "a run", lambda p, fps: float(speed(p, fps).max()) > _RUNS
     elif walks and phrase.has(r"\b(?:fast|quick|brisk|hurr|rush|swift)"):
@@ -274,18 +271,18 @@ def _paces(phrase: _Phrase) -> Iterator[_Named]:
 
 def _postures(phrase: _Phrase) -> Iterator[_Named]:
     sits = phrase.has(r"\b(?:sit|sits|sitting|sat|takes? a seat|taking a seat)\b(?!-| ups?\b)")
-    if sits and phrase.has(_FLOOR) and not phrase.has(_SEAT):
+    if sits and phrase.has(_WORDS["floor"]) and not phrase.has(_WORDS["seat"]):
         yield "sitting on the floor", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & _upright(p), 1.0, fps)
     elif sits:
         yield "sitting", lambda p, fps: bool(seats(p, fps, shortest=0.5))
-    elif phrase.has(_SEAT) and "change" in phrase.kinds:
+    elif phrase.has(r"\b(?:gets?|stands?|rises?|rising|getting) .*\b(?:from|out of|off)\b", _WORDS["seat"]):
         yield "sitting at the start", lambda p, fps: any(one.begin < 1 for one in seats(p, fps, shortest=0.25))
     if phrase.has(r"\b(?:lie|lies|lying)\b|\blay(?:s|ing)? down\b") and not phrase.has(
         r"\b(?:gets?|stands?|rises?) (?:back )?up"
     ):
-        yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > _FLAT), 0.5, fps)
+        yield "lying", lambda p, fps: _lasts((_over_floor(p) < _DOWN) & (torso_inclination(p) > FLAT), 0.5, fps)
         if up := re.search(r"\bon (?:the|his|her|their|its|your|my) (back|stomach|belly|front)\b", phrase.text):
-            yield f"lying on the {up[1]}", lambda p, fps: (_faces_up(p, fps) > 0) == (up[1] == "back")
+            yield f"lying on the {up[1]}", lambda p, fps: (faces_up(p, fps) > 0) == (up[1] == "back")
     if phrase.has(r"\b(?:crouch|kneel|squat|duck)"):
         yield "going low", lambda p, fps: float(pelvis_height(p).min()) < _LOW
     if phrase.has(
@@ -303,11 +300,12 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
     hands = {"": (0, 1), "left": (0,), "right": (1,)}[limb]
     rest = [hand for hand in (0, 1) if hand not in hands]
     if phrase.has(
-        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:\w+ ){0,4}(?:arm|hand)s?\b",
+        r"\b(?:rais|lift|puts?|putting|holds?|reach)\w* (?:up )?(?:(?!(?:with|in|into|by|from|off|to) )\w+ ){0,4}"
+        r"(?:arm|hand)s?\b",
         r"rais|lift|\bup\b|over (?:\w+ )?head",
     ):
         both = phrase.has(r"\b(?:arms|hands)\b") and not limb
-        joint = "spine3" if phrase.has(_LEVEL) else "neck"
+        joint = "spine3" if phrase.has(_WORDS["level"]) else "neck"
         yield (
             "a raised arm",
             lambda p, fps: (
@@ -317,9 +315,9 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         )
     if phrase.has(r"\b(?:lower|drop)\w* (?:\w+ ){0,3}(?:arm|hand)s?\b"):
         yield "a lowered arm", lambda p, fps: float(hands_height(p[-1:], over="pelvis")[:, list(hands)].max()) < _HANGS
-    if phrase.has(_ARMS_OUT):
+    if phrase.has(_WORDS["arms_out"]):
         yield "arms out", lambda p, fps: _lasts(_arms_out(p), 0.4 * len(p) / fps, fps)
-    if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:\w+ ){0,2}knees?\b"):
+    if phrase.has(r"\b(?:rais|lift|pull|draw|bring|pick)\w* (?:up )?(?:(?!to )\w+ ){0,2}knees?\b"):
         yield "a raised knee", lambda p, fps: any(_lasts(_knees(p)[:, hand] > -_KNEE, 0.2, fps) for hand in hands)
     if phrase.has(r"\b(?:rais|lift)\w* (?:up )?(?:\w+ ){0,3}(?:leg|foot)\b"):
         yield "a raised foot", lambda p, fps: any(_lasts(foot_lifts(p)[:, hand] > _FOOT, 0.3, fps) for hand in hands)
@@ -333,12 +331,12 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
         yield "a hand at the head", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
     if phrase.has(r"\bhands? on (?:the |his |her |their |its |your |my )?(?:hips|waist)\b"):
         yield "hands on the hips", lambda p, fps: _lasts(_near(p, "hip"), 0.5, fps)
-    if phrase.has(r"\b(?:throw|toss|hurl|pitch)") and not phrase.has(_NO_THROW):
+    if phrase.has(_WORDS["throws"]):
         yield "a throw", lambda p, fps: _throws(_wrist_speed(p, fps).max(axis=0), hands)
     if phrase.has(r"(?<!\ba )(?<!\bthe )(?<!\bhis )(?<!\bher )\b(?:drink|sip|takes? a bite|eat)"):
         yield "a hand at the mouth", lambda p, fps: _lasts(_hand_to_head(p) < 0.3, 0.3, fps)
-    if phrase.has(r"\b(?:put|set|lay|place)\w* (?!up)(?:\w+ ){1,4}down\b(?! on an?\b| on the \w+)") and not phrase.has(
-        _LIMB
+    if phrase.has(
+        r"\b(?:put|set|lay|place)\w* (?!up)(?:\w+ ){1,4}down\b", r"\b(?:floor|ground|box|crate|suitcase|bucket)\b"
     ):
         yield "a hand near the floor", lambda p, fps: float(_hands_over_floor(p).min()) < _DOWN
     if phrase.has(
@@ -349,21 +347,28 @@ def _arms(phrase: _Phrase, limb: Side) -> Iterator[_Named]:
 
 
 def _whole_body(phrase: _Phrase) -> Iterator[_Named]:
-    if phrase.has(_TUMBLES):
+    if phrase.has(_WORDS["tumbles"]):
         yield "the head below the hips", lambda p, fps: float((p[:, J["head"], 1] - p[:, 0, 1]).min()) < -0.1
-    if phrase.has(_STANDS) and phrase.kinds <= {"gesture", "state"} and not phrase.has(_NOT_STANDING):
-        yield "standing upright", _is_upright
     if phrase.has(r"\bsway|\brock(?:s|ing)? (?:gently|slowly|from|left|to|side)"):
         yield "swings from side to side", lambda p, fps: oscillations(in_body(p)[:, J["neck"], 0] - _feet(p), 0.06) >= 3
     if phrase.has(r"\bbend(?:s|ing)? (?:down|over|forwards?|at)\b|\bhands on (?:\w+ )?knees\b"):
         yield "a bend", lambda p, fps: _lasts(torso_inclination(p) > _BENDS, 0.2, fps)
-    if bent := re.search(_SIDE_BEND, phrase.text):
+    if bent := re.search(_WORDS["side_bend"], phrase.text):
         sign = 1 if bent[1] == "left" else -1
         yield f"a lean to the {bent[1]}", lambda p, fps: _lasts(sign * _sideways(p) > _LEANS, 0.3, fps)
     if phrase.has(r"\bcrawl|\ball fours\b"):
         yield "hands and knees on the floor", lambda p, fps: float(np.median(_hands_over_floor(p))) < _DOWN
-    if phrase.has(_FALLS):
+    if (rolls := re.search(r"\brolls? (forward|backward)|\b(forward|backward) rolls?\b", phrase.text)) is not None:
+        way = rolls[1] or rolls[2]
+        yield f"a roll {way}", lambda p, fps: pitch(p) * (1 if way == "forward" else -1) > np.pi
+    if (aside := re.search(rf"\brolls? (?:over )?(?:on {_DET} \w+ )?to {_DET} (left|right)", phrase.text)) is not None:
+        sign = 1 if aside[1] == "left" else -1
+        yield f"a roll to the {aside[1]}", lambda p, fps: sign * log_roll(p) > np.pi / 2
+    if phrase.has(_WORDS["falls"]):
         leaps = phrase.has(r"\b(?:jump|leap|flip|div|somersault)")
+        for name, (words, to) in FALL_WAYS.items():
+            if words.search(phrase.text):
+                yield f"a fall {name.replace('_', ' ')}", lambda p, fps, to=to: _falls_to(p, fps, to)  # type: ignore[misc]
         yield "a fall", lambda p, fps: _lasts(_over_floor(p) < _DOWN, 0.25, fps) and (leaps or _falls_as_people(p, fps))
 
 
@@ -385,19 +390,27 @@ def _sideways(p: Array) -> Array:
     return np.arctan2(trunk[:, 0], trunk[:, 1])
 
 
-def _is_upright(p: Array, fps: float) -> bool:
-    """Whether somebody stands upright in one place: (frames, 22, 3) metres."""
-    upright = float(np.median(torso_inclination(p))) < _UPRIGHT / 2 and float(pelvis_height(p).min()) > _LOW - 0.05
-    leaps = float(p[:, 0, 1].max() - np.median(p[: max(1, round(fps / 4)), 0, 1])) > _LEAPS
-    return upright and not leaps and float(np.hypot(*_from_start(p).T).max()) < 1.0
-
-
 def _falls_as_people(p: Array, fps: float) -> bool:
     """Whether somebody who falls does not leap first, and does not hold the legs up who lies at the end."""
     begin, end = p[: max(1, round(fps / 4))], p[-max(1, round(fps / 2)) :]
     lies = float(end[:, 0, 1].mean()) < _DOWN * leg_length(p)
     leaps = float(p[:, 0, 1].max() - np.median(begin[:, 0, 1])) > _LEAPS
     return not leaps and not (lies and float(end[:, list(ANKLES), 1].max()) > _CHAIR)
+
+
+def _falls_to(p: Array, fps: float, to: tuple[int, int]) -> bool:
+    """Whether the trunk of somebody who goes down tips to that side (ahead, left) of where they were faced."""
+    low = _over_floor(p) < 2 * _DOWN
+    if not low.any():
+        return False
+    first = int(low.argmax())
+    up = max(0, first - round(0.75 * fps))
+    tips = (p[:, J["neck"]] - p[:, list(ANKLES)].mean(axis=1))[first : first + max(1, round(fps / 2)), :][:, [0, 2]]
+    across = p[up, J["left_hip"], [0, 2]] - p[up, J["right_hip"], [0, 2]]
+    left = across / max(float(np.linalg.norm(across)), 1e-9)
+    front = np.array([-left[1], left[0]])
+    turned_over = to[0] * faces_up(p, fps) > 0.1  # who falls backwards comes to lie on the back
+    return not turned_over and float((tips @ (to[0] * front + to[1] * left)).mean()) > _TIPS
 
 
 def _over_floor(p: Array) -> Array:
@@ -419,12 +432,6 @@ def _near(p: Array, joint: str) -> np.ndarray:
 def _knees(p: Array) -> Array:
     """(frames, 2) leg lengths of the left and the right knee over the hips."""
     return (p[:, [J["left_knee"], J["right_knee"]], 1] - p[:, [J["left_hip"], J["right_hip"]], 1]) / leg_length(p)
-
-
-def _faces_up(p: Array, fps: float) -> float:
-    """How far up the chest faces in the last quarter of a second: above 0 on the back, below on the belly."""
-    across = p[:, J["left_shoulder"]] - p[:, J["right_shoulder"]]
-    return float(np.cross(across, p[:, J["neck"]] - p[:, 0])[-max(1, round(fps / 4)) :, 1].mean())
 
 
 def _arms_out(p: Array) -> np.ndarray:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.goals.numerals import in_digits
+from motionloom.goals.verbs import asserted
 
 Array = NDArray[np.float64]
 EASE = 0.4
@@ -101,6 +102,7 @@ def head_said(text: str) -> HeadMove | None:
 
     How often and how quickly counts for a nod and a shake; of a look only the words of it do.
     """
+    text = asserted(text)
     said = _SAID.search(text)
     if said is None:
         return None

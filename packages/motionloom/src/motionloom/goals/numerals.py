@@ -21,11 +21,13 @@ _HALF = re.compile(rf"\b{NUMBER} and a half\b")
 
 
 def in_digits(text: str, *, lower: bool = True) -> str:
-    """A text with its numbers in digits: "walks three and a half meters" becomes "walks 3.5 meters".
+    """A text with its numbers in digits: "walks three and a half meters" becomes "walks 3.5 meters", "1,5 m" "1.5 m".
 
     In lower case, blanks and commas as single blanks; ``lower`` False leaves both as they are.
     """
-    result = " ".join(text.lower().replace(",", " ").split()) if lower else text
+    result = re.sub(r"(?<=\d),(?=\d{3}\b)", "", text)
+    result = re.sub(r"(?<=\d),(?=\d{1,2}\b)", ".", result)
+    result = " ".join(result.lower().replace(",", " ").split()) if lower else result
     result = _WORDS.sub(_value, result)
     result = _HALF.sub(lambda match: f"{float(match[1]) + 0.5:g}", result)
     result = re.sub(r"\bhalf an? (?=m(?:et|in)|second|foot|yard)", "0.5 ", result)

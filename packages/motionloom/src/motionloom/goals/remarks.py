@@ -2,14 +2,14 @@
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from motionloom.goals.contact import read_contact
 from motionloom.goals.heads import is_of_head
-from motionloom.goals.roles import MARK, prompts_of, without_two
+from motionloom.goals.roles import MARK, SEVERAL, prompts_of, tells_of_several, without_two
 from motionloom.goals.timeline import Timeline
-from motionloom.goals.verbs import in_plainer_words, subject_of
+from motionloom.goals.verbs import TABLES, in_plainer_words, rare_verb, subject_of, word_patterns
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
 
@@ -31,13 +31,20 @@ be this that one two three something somebody someone very like out off around t
 _LIGHT, _FUNCTION = frozenset(map(stem, _LIGHT_WORDS.split())), frozenset(_FUNCTION_WORDS.split())
 
 
+_DENIED = word_patterns("remarks")["denied"]
+LINE = 100
+"""Characters of a line at most."""
+
+
 def numbers_read(timeline: Timeline) -> str:
-    """A line with the numbers that were read in the words of a timeline, and the seconds of each; empty for none."""
+    """A line with the numbers that were read in the words of a timeline, the seconds of each, and those that are not
+    kept; empty for none."""
     readings = [
         f"{one.amount}, {sum(segment.seconds for segment in timeline.segments[one.first : one.end]):g} s"
         for one in timeline.readings
     ]
-    return f"read as: {'; '.join(readings)}" if readings else ""
+    kept = [f"read as: {'; '.join(readings)}"] if readings else []
+    return clipped("; ".join(kept + [f"not kept: {', '.join(timeline.unread)}"] * bool(timeline.unread)), LINE - 24)
 
 
 def parts_read(timeline: Timeline) -> str:
@@ -46,8 +53,23 @@ def parts_read(timeline: Timeline) -> str:
         return ""
     if [(one.first, one.end) for one in timeline.readings] == [(0, len(timeline.segments))]:
         return ""
-    listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in timeline.segments)
-    return f"one after the other: {listed}"
+    subject = subject_of(timeline.segments[0].text)
+    listed = ", ".join(f"{one.text.removeprefix(subject).strip()} {one.seconds:.1f} s" for one in timeline.segments)
+    return clipped(f"one after the other: {listed}", LINE - 24)
+
+
+def clipped(line: str, most: int = LINE) -> str:
+    """The line, or as much of it as that many characters hold."""
+    return line if len(line) <= most else f"{line[: most - 4].rsplit(' ', 1)[0]} ..."
+
+
+def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
+    """A sentence with verbs whose manner is lost, or what texts are generated as; empty where none is."""
+    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
+    lost = [f"'{verb}'" for one, _ in changed if (verb := rare_verb(one))]
+    if lost:
+        return clipped(f"the manner of {', '.join(lost)} is not shown")
+    return clipped(", ".join(f"sampled in other words: '{other}'" for _, other in changed))
 
 
 def remarks_on_two(
@@ -59,20 +81,22 @@ def remarks_on_two(
     the prior knows. Raises `MotionloomError` as the encoder does.
     """
     prompts = {text: prompts_of(text) for text in texts if text.strip()}
+    alike = [text for text, pair in prompts.items() if pair[0] == pair[1]]
     remarks = []
     for text, pair in prompts.items():
         if MARK not in text and pair[0] != pair[1]:
-            remarks.append(Remark(text, f"read as: '{pair[0]} {MARK} {pair[1]}'"))
+            remarks.append(Remark(text, clipped(f"read as: '{pair[0]} {MARK} {pair[1]}'")))
         contact = read_contact(pair)
         remarks += [] if contact is None else [Remark(text, f"read as: {contact}")]
-    if block_known is not None and prompts:
-        matches = nearest(block_known, [without_two(text) for text in prompts], encoder)
+    if block_known is not None and alike:
+        matches = nearest(block_known, [without_two(text) for text in alike], encoder)
         remarks += [
             Remark(text, f"of two people {one.remark()}", one.sentences)
-            for text, one in zip(prompts, matches, strict=True)
+            for text, one in zip(alike, matches, strict=True)
             if not one.near
         ]
-    return remarks + remarks_on([prompt for pair in prompts.values() for prompt in pair], known, encoder)
+    alone = remarks_on([without_two(one) for pair in prompts.values() for one in pair], known, encoder)
+    return remarks + [one for one in alone if one.line != SEVERAL]
 
 
 def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, *, heads: bool = False) -> list[Remark]:
@@ -86,12 +110,23 @@ def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder, 
     ]
     english = [text for text in distinct if is_english(text)]
     remarks = [
-        Remark(text, f"{text[:60]!r} does not look like English, and these weights know nothing else")
+        Remark(text, f"{text[:50]!r} does not look like English, the one language of these weights")
         for text in distinct
         if text not in english
     ]
+    remarks += [
+        Remark(text, f"'{match[1]}' is not understood: what it denies may be shown")
+        for text in english
+        if (match := _DENIED.search(text))
+    ]
+    remarks += [Remark(text, SEVERAL, ()) for text in [one for one in english if tells_of_several(one)][:1]]
     matches = nearest_known(english, known, encoder) if known else []
-    return remarks + [Remark(one.prompt, one.remark(), _instead(one)) for one in matches if not one.near]
+    return remarks + [Remark(one.prompt, line, _instead(one)) for one in matches if (line := _unknown(one))]
+
+
+def _unknown(match: Nearest) -> str:
+    rare = rare_verb(match.prompt)
+    return match.remark() if not match.near else f"these weights hardly know '{rare}'" if rare else ""
 
 
 def _instead(match: Nearest) -> tuple[str, ...]:
@@ -124,20 +159,7 @@ def verb_words(text: str) -> tuple[str, ...]:
 # Whether a prompt is English: the weights have read nothing else. By letters (another alphabet), and by the small words
 # that every sentence of a language has; where there is nothing to go by a prompt counts as English.
 
-_ENGLISH_WORDS = """the and is are to with his her he she they their of on from while then up down forward walks runs
-person someone this that for by into out around back left right hand hands at as it its be was were"""
-_OTHER_WORDS = """
-der das ein eine einen einem einer und ist nach mit auf sich dann geht läuft springt seine ihre beiden vorwärts
-het een naar zijn haar met loopt vooruit iemand och ett sig går springer framåt og fremad hopper mann kvinne
-les une et avec puis vers dans qui marche saute homme femme personne
-las una con hacia camina salta corre persona hombre mujer luego su
-il lo gli che poi cammina avanti uomo donna um uma com para pessoa homem mulher anda
-się idzie skacze osoba człowiek jde skáče bir ve adam yürüyor kişi ileri
-"""
-"""German; Dutch and Scandinavian; French; Spanish; Italian and Portuguese; Polish, Czech and Turkish."""
-_SMALL_WORDS = "la le el en y e i du des se na los w z"
-"""Words that names and borrowed phrases have too: they count only beside another."""
-_ENGLISH, _OTHERS, _SMALL = (frozenset(words.split()) for words in (_ENGLISH_WORDS, _OTHER_WORDS, _SMALL_WORDS))
+_ENGLISH, _OTHERS, _SMALL = (frozenset(TABLES["languages"][name].split()) for name in ("english", "others", "small"))
 
 
 def is_english(text: str) -> bool:

@@ -3,6 +3,9 @@
 import re
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.verbs import word_patterns
+
+_WORDS = word_patterns("roles")
 
 MARK = "::"
 """Parts what the first person does from what the second does, in one text."""
@@ -16,12 +19,6 @@ _SECOND = re.compile(
     r"(?:\s*[,;.]\s*(?:and |while |but |then )*|\s+(?:and|while|whilst|as|but|whereas) (?:then )?)"
     rf"(?:the other|the second|another)(?: one)?(?! (?:{_PARTS})\b)(?: ({_NOUN}))? "
 )
-_TWO = re.compile(
-    r"^\W*(?:(?:a|the) couple|(?:the |these )?(?:two|both)(?: of them)?"
-    r"(?: \w*(?:people|persons|men|women|dancers|friends))?) ",
-    re.I,
-)
-_ALIKE = re.compile(r"(?:does (?:the same|so|it|likewise)|follows suit)\b")
 
 
 def prompts_of(prompt: str | tuple[str, str]) -> tuple[str, str]:
@@ -45,11 +42,19 @@ def read_roles(text: str) -> tuple[str, str] | None:
     if first is None or second is None:
         return None
     does = sentence[first.end() : second.start()], sentence[second.end() :]
-    if _ALIKE.match(does[1].lower()):
+    if _WORDS["alike"].match(does[1].lower()):
         return None
     return f"a {first[1] or first[2] or 'person'} {does[0]}", f"a {second[1] or 'person'} {does[1]}"
 
 
 def without_two(text: str) -> str:
     """The sentence without "two people", "a couple" and such at its beginning, which say nothing of what is done."""
-    return _TWO.sub("", text)
+    return _WORDS["two"].sub("", text)
+
+
+SEVERAL = "one person is made here; two are made by: motionloom duet"
+
+
+def tells_of_several(text: str) -> bool:
+    """Whether a sentence tells of two or more people: "two people fight", "they hug each other"."""
+    return bool(_WORDS["several"].search(text)) or read_roles(text) is not None

@@ -4,41 +4,23 @@ import math
 import re
 
 from motionloom.goals.amounts import read_seconds
-from motionloom.goals.verbs import base_of, kind_of_verb
+from motionloom.goals.numerals import NUMBER, in_digits
+from motionloom.goals.verbs import TABLES, base_of, kind_of_verb, word_patterns
+
+_WORDS = word_patterns("seconds")
 
 SHORTEST = 1.2
 """Seconds of the shortest part."""
 LONGEST = 12.0
 """Seconds of the longest part by nature; a longer one is requested in numbers."""
 
-_SECONDS = {
-    "locomotion": 4.0,
-    "gesture": 4.0,
-    "state": 3.0,
-    "change": 3.0,
-    "event": 2.5,
-    "jump": 2.5,
-    "turn": 3.0,
-    "fight": 3.0,
-    "dance": 5.0,
-    "other": 4.0,
-}
-"""Kinds of verbs, and the seconds such an action takes."""
 _GOES_ON, WHOLE = ("locomotion", "state", "dance"), 5.0
 """What can go on, and what is repeated, does so for `WHOLE` seconds where it is the whole sentence."""
-_REPEATS = re.compile(
-    r"\b(?:jumping jacks|(?:push|sit|pull)-?ups|up and down|back and forth|to and fro|side to side|again and again"
-    r"|repeatedly|keeps?)\b",
-    re.IGNORECASE,
-)
-_QUICK = re.compile(r"\b(?:wav|nod|shak|knock|clap|tap|pat|bounc|flap|point|swing)\w*")
-"""Gestures whose strokes follow each other in less than a second."""
-_STAIRS = re.compile(r"\b(?:(?:up|down)?stairs?|stairway|staircase)\b", re.IGNORECASE)
 _ON_STAIRS = 4.0
 """People were recorded there for no longer: who goes up for longer in the data climbs a ladder."""
-_ON_THE_SPOT = re.compile(r"\b(?:jog|run|march|walk)\w* (?:\w+ly )?(?:in place|on (?:the|one) spot)\b", re.IGNORECASE)
-"""Who does so for longer leaves the place, or stands."""
 _ONE_FLIGHT = 3.0
+WORDS = 5.0
+"""Words per second of a long text at most: each tells something."""
 _LONGER = (
     (re.compile(r"\b(?:lies?|lay|lying)\b"), 6.0),
     (_FALLS := re.compile(r"\b(?:falls?|fell|falling|trips?|tripping)\b"), 3.5),
@@ -47,58 +29,36 @@ _LONGER = (
 """What takes longer than others of its kind."""
 MOST_AT_ONCE = 9.8
 """The longest motion of the recordings that the weights were trained on."""
-_REPEATED = re.compile(
-    r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ ){0,2}"
-    r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
-    r"|burpees|crunches|claps|nods|bows|hops"
-    r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches"
-    r"|laps|reps|repetitions|jabs"
-    r"|swings|throws|leaps|knocks|strikes|sets|rounds|bends|dips|twirls)\b"
-)
-_NUMBER = {
-    "once": 1,
-    "twice": 2,
-    "thrice": 3,
-    "two": 2,
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "six": 6,
-    "seven": 7,
-    "eight": 8,
-    "nine": 9,
-    "ten": 10,
-    "several": 4,
-    "few": 3,
-}
 
 
 def natural_seconds(text: str) -> float:
     """How long an action takes people, by its kind, its numbers and how quickly it is done; 1.2 to 12 s."""
-    words = text.lower()
+    words = re.sub(r"\bseveral\b|\b(?:a )?few\b", "3", in_digits(text))
     if (explicit := read_seconds(text)) is not None:
         return max(explicit, SHORTEST)
     kind = _kind(words)
-    seconds = _SECONDS[kind]
+    seconds = float(TABLES["seconds"][kind])
     if kind in ("change", "event") or _FALLS.search(words):  # "stumbles and falls"
         seconds = next((longer for pattern, longer in _LONGER if pattern.search(words)), seconds)
-    if match := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", words):
-        seconds = 1.0 + 0.6 * (_count(match[1]) or 3)
-    elif match := re.search(r"\b(\d+|[a-z]+) (?:times|reps|repetitions)\b", words):
-        number = _count(match[1]) or 2
-        quick = kind == "gesture" and _QUICK.search(words)
+    if match := re.search(rf"\b(?:{NUMBER}|\w+) (?:small |large |big |slow |quick )?steps\b", words):
+        seconds = 1.0 + 0.6 * _count(match[1] or "3")
+    elif match := re.search(rf"\b(?:{NUMBER}|[a-z]+) (?:times|reps|repetitions)\b", words):
+        number = _count(match[1] or "2")
+        quick = kind == "gesture" and _WORDS["quick"].search(words)
         seconds = 2.0 + 0.8 * number if quick else seconds * (0.4 + 0.6 * number)
     elif re.search(r"\b(twice|thrice)\b", words):
         seconds *= 1.6 if "twice" in words else 2.2
-    elif match := _REPEATED.search(words):
-        seconds *= 0.4 + 0.6 * (_count(match[1]) or 2)
+    elif match := _WORDS["repeated"].search(words):
+        seconds *= 0.4 + 0.6 * _count(match[1])
     if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", words):
         seconds = max(seconds, 8.0 if kind == "locomotion" else 6.0)
     if re.search(r"\b(slowly|slow|carefully|gently)\b", words):
         seconds *= 1.3
     elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", words):
         seconds *= 0.8
-    return round(min(max(seconds, SHORTEST), LONGEST), 2)
+    if match := _WORDS["while"].search(words):
+        seconds = max(seconds, 6.0) if match[1] in (None, "long", "good") or match[2] == "time" else seconds
+    return round(min(max(seconds, SHORTEST, len(words.split(" ")) / WORDS), LONGEST), 2)
 
 
 def seconds_alone(text: str) -> float:
@@ -107,8 +67,12 @@ def seconds_alone(text: str) -> float:
     That is walking, dancing, standing and what is repeated, such as jumping jacks; on stairs 4 s.
     """
     goes_on = _kind(text.lower()) in _GOES_ON and not _FALLS.search(text.lower())
-    if read_seconds(text) is None and (goes_on or _REPEATS.search(text)):
-        return _ON_STAIRS if _STAIRS.search(text) or _ON_THE_SPOT.search(text) else max(natural_seconds(text), WHOLE)
+    if read_seconds(text) is None and (goes_on or _WORDS["repeats"].search(text)):
+        return (
+            _ON_STAIRS
+            if _WORDS["stairs"].search(text) or _WORDS["on_the_spot"].search(text)
+            else max(natural_seconds(text), WHOLE)
+        )
     return natural_seconds(text)
 
 
@@ -117,8 +81,10 @@ def flights(text: str, seconds: float) -> int:
 
     People were recorded there for `_ON_STAIRS` seconds at most, and what is longer hardly rises (docs/decisions/0036).
     """
-    up = _STAIRS.search(text) and not re.search(r"\bdown(?:stairs)?\b|\bdescend", text, re.IGNORECASE)
-    return math.ceil(seconds / _ONE_FLIGHT) if (up or _ON_THE_SPOT.search(text)) and seconds > _ON_STAIRS else 1
+    up = _WORDS["stairs"].search(text) and not re.search(r"\bdown(?:stairs)?\b|\bdescend", text, re.IGNORECASE)
+    return (
+        math.ceil(seconds / _ONE_FLIGHT) if (up or _WORDS["on_the_spot"].search(text)) and seconds > _ON_STAIRS else 1
+    )
 
 
 def _kind(words: str) -> str:
@@ -126,5 +92,5 @@ def _kind(words: str) -> str:
     return next((kind_of_verb(word, words) for word in re.findall(r"[a-z]+", words) if base_of(word)), "other")
 
 
-def _count(word: str) -> int:
-    return int(min(float(word), 1000)) if re.fullmatch(r"\d+(?:\.\d+)?", word) else _NUMBER.get(word, 0)
+def _count(number: str) -> int:
+    return int(min(float(number), 1000))

@@ -20,14 +20,20 @@ from motionloom.goals.verbs import (
     MOODS,
     NOUNS_AFTER,
     PRONOUN,
+    TABLES,
     finite,
     kind_of,
     mood_of,
     subject_of,
     verb_of,
+    word_patterns,
 )
 
+_WORDS = word_patterns("sequence")
+
 MOST_PARTS = 20
+MOST_WORDS = 400
+"""Words of a text up to which it is parted."""
 _AGAIN = 0.5
 """Share of its time that a gesture takes which is repeated with its reverse."""
 
@@ -40,73 +46,12 @@ class Part:
     seconds: float
 
 
-_THEN = re.compile(
-    r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this"
-    r"|which)|next(?! to\b)|subsequently"
-    r"|(?:a|one|some) (?:short |little )?(?:moment|second|instant|while|bit) later|(?:moments|seconds) later"
-    r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?"
-    r"(?:after (?:a|some|one) (?:short |little |brief )?(?:moment|while|second|pause|bit|time)\b\s*,?\s*)?"
-    r"|\s*,?\s+and after,?\s+(?=(?:he|she|they)\b)|\s*[.;]\s+(?=\S)",
-    re.IGNORECASE,
+_SHORTENED = re.compile(
+    r"\b(Mr|Mrs|Ms|Dr|Prof|St|Sgt|Capt|Lt|Col|Gen|Jr|Sr|vs|etc|approx|ca|resp|fig|[A-Z]|[eE]\.g|[iI]\.e|[ap]\.m)\.(?= )"
 )
-_NO_SEPARATOR = re.compile(
-    r"\b(?:now|every now|first|only|just|since|until|till|by|next to|(?<!the )right|what) (?:and )?then\b|^back then\b",
-    re.IGNORECASE,
-)
-_SIDESTEPS = re.compile(
-    r"(^|\b(?:person|man|woman|figure|someone|somebody|he|she|they|it|and|then)) ?side[ -]steps\b", re.I
-)
-_LABEL = re.compile(r"^[A-Za-z][\w -]{2,30}: +(?=\w)")
-_SIT_TO_STAND = re.compile(
-    r"\bsit[ -]to[ -]stands?\b(?: from (?:an?|the) (?:\w+ )?chair)?"
-    r"(?:,? without (?:using )?(?:the|your|his|her) (?:arms|hands))?",
-    re.IGNORECASE,
-)
-_STOPS_TO = re.compile(
-    rf"\b(stops|stop|stopped) to ({'|'.join(sorted(MOODS['base'], key=len, reverse=True))})\b", re.IGNORECASE
-)
-_FINISHES = re.compile(r"(?<!\bthe )\b(?:finish|end)(es|s|ing)? with(?= an? )", re.IGNORECASE)
-_JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
-_AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
-_SUBORDINATE = re.compile(
-    r"\b(?:who|that|which|because|until|till|when|where|since|so that|as if|as though|if|unless|although|whenever)\b",
-    re.IGNORECASE,
-)
-"""Words with which a clause of time, place or reason begins: what "and" joins behind one may belong to it."""
-_COUNTED = re.compile(
-    r"\b(?:a|one|two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ ){0,2}(?:steps?|paces|strides?)\b",
-    re.IGNORECASE,
-)
-_STOPS = re.compile(r"(?:stop|halt|pause)s?(?: (?:there|again|walking|moving))?", re.IGNORECASE)
-_WAITS = re.compile(r"\s*(?:wait|rest|remain|stay|pose|sleep)(?:s|ed|ing)?\b", re.IGNORECASE)
-_LASTS = re.compile(
-    _WAITS.pattern + r"|(?:relax|doze|nap)(?:es|s|ed|ing)?\b|(?:falls?|fell|falling) asleep\b"
-    r"|(?:goes?|went|going) to sleep\b|(?:does|do|did)(?:n't| not) move\b|keeps? (?:still|sitting|lying|kneeling)\b",
-    re.IGNORECASE,
-)
-"""Predicates of somebody who goes on being as they are."""
+"""Words that end in a dot where no sentence ends."""
 _POSTURES = {"sit": "sit", "lie": "lie", "lay": "lie", "kneel": "kneel", "crouch": "crouch", "squat": "crouch"}
 """Verbs of who ends up low, and of who is: the weights know nobody who stays in a squat."""
-_DOWN = re.compile(r"take a seat\b.*|(?:drop|go|get|sink|fall|take) (?:(?!up |off )\w+ ){0,3}knees?\b.*", re.IGNORECASE)
-_WHERE_LOW = re.compile(
-    r"\bon (?:the|his|her|their|its|your|my) (?:floor|ground|back|side|stomach|belly)\b", re.IGNORECASE
-)
-
-_HEAD_OR_HANDS = re.compile(
-    r"(?:puts?|putting|places?|placing|drops?|buries) "
-    r"(?:the|his|her|their|its|your|my|both) (?:head|face|chin|hands?|arms?|feet)\b"
-)
-_TOGETHER = (
-    (
-        ("bend", "stoop", "crouch", "lean"),
-        ("pick", "grab", "touch", "take", "lift", "reach", "put", "place"),
-    ),
-    (("reach",), ("pick", "grab", "take", "get")),
-    (("stumble", "trip", "slip", "stagger", "lose"), ("fall", "crash", "collapse", "tumble", "land")),
-)
-"""Somebody bends and grasps, stumbles and falls at once."""
-_COMES_UP = re.compile(r"(?:stand|come|get|go|rise|straighten) (?:right |straight )?(?:back )?up\b", re.IGNORECASE)
-"""What only ends each of several repetitions: "squats down and comes back up three times"."""
 
 
 def split_actions(text: str) -> tuple[Part, ...]:
@@ -115,6 +60,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
     One part, the text as it is, where the sentence says one thing or things at once; at most `MOST_PARTS`, else it is
     left whole too.
     """
+    if text.count(" ") > MOST_WORDS:
+        return (Part(text, natural_seconds(text)),)
     whole = _prepared(" ".join(text.split()).rstrip(" .;,"))
     clauses = [clause for sentence in _split_by_time(whole) for clause in _split_by_then(sentence)]
     if len(clauses) > 1:
@@ -135,9 +82,11 @@ def split_actions(text: str) -> tuple[Part, ...]:
         if not named and mood_of(rest) == "gerund":
             named = "a person"
         # "a guard who walks and stops is bored"; a run-up belongs to what it is for
-        whole_clause = _SUBORDINATE.search(named) or re.search(r"\brun-?up\b", rest, re.IGNORECASE)
+        whole_clause = _WORDS["subordinate"].search(named) or re.search(r"\brun-?up\b", rest, re.IGNORECASE)
         items = [rest] if whole_clause else _split_list(rest)
         parts += [_sentence(named, finite(item)) for item in items]
+    if len(parts) > 2 * MOST_PARTS:
+        return (Part(text, natural_seconds(text)),)
     cycles = repeat_cycles(parts, MOST_PARTS)
     parts = cycles or resolve_ellipsis(parts)
     if not 1 < len(parts) <= MOST_PARTS:
@@ -153,10 +102,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
 
 def _prepared(text: str) -> str:
     """The text without a label before it ("victory emote: ..."), and with verbs for what only sounds like nouns."""
-    text = _SIDESTEPS.sub(r"\1 sidesteps", _LABEL.sub("", text))
-    text = _SIT_TO_STAND.sub("sit down on a chair and stand up", text)
-    text = _STOPS_TO.sub(lambda match: f"{match[1]}, {_form_as(match[1], match[2])}", text)
-    return _FINISHES.sub(lambda match: {"": "do", "es": "does", "s": "does", "ing": "doing"}[match[1] or ""], text)
+    text = _WORDS["sidesteps"].sub(r"\1 sidesteps", _WORDS["label"].sub("", _SHORTENED.sub(r"\1", text)))
+    return _WORDS["stops_to"].sub(lambda match: f"{match[1]}, {_form_as(match[1], match[2])}", text)
 
 
 def _form_as(stops: str, base: str) -> str:
@@ -171,7 +118,7 @@ def _merge_rests(parts: Sequence[Part]) -> list[Part]:
         rest = part.text.removeprefix(subject_of(part.text)).strip()
         before = _first_verb(result[-1].text) if result else ""
         moves = before in WALKS and not SQUATS.search(result[-1].text) if result else True
-        if (_LASTS.match(rest) and before in _POSTURES) or (STAYS.match(in_base(rest)) and not moves):
+        if (_WORDS["lasts"].match(rest) and before in _POSTURES) or (STAYS.match(in_base(rest)) and not moves):
             both = result[-1].seconds + part.seconds
             result[-1] = Part(result[-1].text, both if read_seconds(part.text) else min(both, LONGEST))
         else:
@@ -193,13 +140,13 @@ def _keep_postures(parts: Sequence[str]) -> list[str]:
         mood, verb = mood_of(rest), _first_verb(part)
         if STAYS.match(in_base(rest)):
             pass
-        elif verb in _POSTURES or _DOWN.fullmatch(in_base(rest)):
+        elif verb in _POSTURES or _WORDS["down"].fullmatch(in_base(rest)):
             posture = _POSTURES.get(verb, "kneel" if "knee" in rest else "sit")
-            where = _WHERE_LOW.search(rest)
+            where = _WORDS["where_low"].search(rest)
             place = f" {where[0]}" if where and posture in ("sit", "lie") else ""
-        elif posture and (kind_of(part, mood) == "gesture" or verb == "lean" or _HEAD_OR_HANDS.match(rest)):
+        elif posture and (kind_of(part, mood) == "gesture" or verb == "lean" or _WORDS["head_or_hands"].match(rest)):
             part = f"{named} {form_of(posture, mood)}{place} and {rest}".strip()
-        elif not _WAITS.match(rest):
+        elif not _WORDS["waits"].match(rest):
             posture = ""
         result.append(part)
     return result
@@ -272,10 +219,10 @@ def _with_subject(clauses: list[str], main: str) -> list[str]:
 
 def _split_by_then(text: str) -> list[str]:
     """Clauses parted by "then" and its like."""
-    exempt = [(match.start(), match.end()) for match in _NO_SEPARATOR.finditer(text)]
+    exempt = [(match.start(), match.end()) for match in _WORDS["no_separator"].finditer(text)]
     cuts = [
         match
-        for match in _THEN.finditer(text)
+        for match in _WORDS["then"].finditer(text)
         if not any(begin < match.end() and match.start() < end for begin, end in exempt)
     ]
     pieces, at = [], 0
@@ -289,9 +236,9 @@ def _split_by_then(text: str) -> list[str]:
 
 def _split_list(clause: str) -> list[str]:
     """The items of a list of verbs, if they follow each other; else the clause alone."""
-    if _AT_ONCE.search(clause) or not clause:
+    if _WORDS["at_once"].search(clause) or not clause:
         return [clause] if clause else []
-    tokens = _JOIN.split(clause)
+    tokens = _WORDS["join"].split(clause)
     items, joins = [tokens[0]], []
     mood = mood_of(tokens[0])
     for join, piece in zip(tokens[1::2], tokens[2::2], strict=True):
@@ -302,7 +249,7 @@ def _split_list(clause: str) -> list[str]:
             joins.append(join)
         else:
             items[-1] += join + piece
-    if len(items) < 2 or (len(items) == 2 and _COMES_UP.match(in_base(items[1])) and read_amount(clause)):
+    if len(items) < 2 or (len(items) == 2 and _WORDS["comes_up"].match(in_base(items[1])) and read_amount(clause)):
         return [clause]
     if len(items) > 2:
         return items
@@ -310,9 +257,9 @@ def _split_list(clause: str) -> list[str]:
     kinds = kind_of(items[0], mood), kind_of(items[1], mood)
     amounts = [read_amount(item) for item in items]
     counted = any(one and (one.kind == "turn" or "gesture" not in kinds) for one in amounts)
-    waits = kinds[0] == "state" and bool(_WAITS.match(items[1]))  # "stands there and waits"
+    waits = kinds[0] == "state" and bool(_WORDS["waits"].match(items[1]))  # "stands there and waits"
     verbs = verb_of(items[0], mood), verb_of(items[1], mood)
-    together = not comma and any(verbs[0] in first and verbs[1] in second for first, second in _TOGETHER)
+    together = not comma and any(verbs[0] in one["first"] and verbs[1] in one["second"] for one in TABLES["together"])
     return items if comma or counted or (_follows(*kinds) and not waits and not together) else [clause]
 
 
@@ -358,6 +305,6 @@ def _is_thing(item: str, join: str) -> bool:
 
 def _is_subordinate(item: str, join: str, piece: str) -> bool:
     """Whether what follows is of the clause of time, place or reason before, or the end of counted steps."""
-    if _COUNTED.search(item) and _STOPS.fullmatch(piece.strip()):
+    if _WORDS["counted"].search(item) and _WORDS["stops"].fullmatch(piece.strip()):
         return True
-    return "," not in join and bool(_SUBORDINATE.search(item))
+    return "," not in join and bool(_WORDS["subordinate"].search(item))

@@ -24,6 +24,7 @@ from motionloom.goals.amounts import (
     read_seconds,
     seconds_for,
     single_stroke,
+    unread_numbers,
 )
 from motionloom.goals.fields import Field, LinedFile
 from motionloom.goals.goal import FPS, Goal, merged
@@ -74,6 +75,8 @@ class Timeline:
     """Targets for the whole motion in the world, one row per frame."""
     readings: tuple[Reading, ...] = ()
     """Numbers in the words of segments, which their goals and lengths come of."""
+    unread: tuple[str, ...] = ()
+    """Quantities in the words that are not kept: "3 km"."""
 
     @property
     def begins(self) -> tuple[int, ...]:
@@ -181,9 +184,12 @@ def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre
     found = (read_amount(part.text, around=len(parts) > 1) for part in parts)
     read = [amount and replace(amount, metre=metre) for amount in found]
     amounts = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
-    own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, amounts, strict=True)]
+    times = [read_seconds(part.text) for part in parts]
+    each = zip(parts, amounts, times, strict=True)
+    unread = tuple(one for part, amount, time in each for one in unread_numbers(part.text, amount, time))
+    own = [time or (one and seconds_for(one)) for time, one in zip(times, amounts, strict=True)]
     if not any(own):
-        return _timeline_of_parts(text, parts, seconds)
+        return replace(_timeline_of_parts(text, parts, seconds), unread=unread)
     natural = [replace(part, seconds=length or part.seconds) for part, length in zip(parts, own, strict=True)]
     fixed = seconds is not None
     if seconds is None and len(parts) == 1:
@@ -195,7 +201,20 @@ def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None, metre
             several = in_seconds(several, segment.seconds) if fixed else several
             readings.append(Reading(amount, len(segments), len(segments) + len(several), fixed))
         segments += several
-    return Timeline(tuple(segments), readings=tuple(readings))
+    return Timeline(tuple(segments), readings=tuple(readings), unread=unread)
+
+
+def with_goals_read(segments: Sequence[Segment]) -> tuple[Segment, ...]:
+    """Blocks with the ways, turns and steps that their words say in numbers as goals, in the time that each has.
+
+    A block with a goal, or whose way nobody runs in its time, stays as it is; so do repetitions.
+    """
+    result = []
+    for one in segments:
+        amount = None if one.goal is not None else read_amount(one.text, around=len(segments) > 1)
+        fits = amount is not None and amount.kind != "count" and seconds_for(amount) < 2 * one.seconds
+        result.append(replace(one, goal=goal_for(amount, one.seconds)) if amount and fits else one)
+    return tuple(result)
 
 
 def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[Segment, ...]:

@@ -49,7 +49,7 @@ def sentence_json(text: str, limits: Limits) -> Any:
     """A sentence as the JSON of a timeline: a segment for each action that it has, as long as such actions take."""
     if not text.strip() or len(text) > limits.prompt:
         raise MotionloomError(f"a sentence has 1 to {limits.prompt} characters; got {len(text.strip())}")
-    timeline = _checked(timeline_of(" ".join(text.split())), limits)
+    timeline = _checked(timeline_of(" ".join(text.split()), amounts=True), limits)
     return {"segments": [{"text": one.text, "seconds": round(one.seconds, 2)} for one in timeline.segments]}
 
 

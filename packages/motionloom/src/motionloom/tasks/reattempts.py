@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from motionloom.diffusion.sampling import row_seed
-from motionloom.goals.expected import missing
-from motionloom.goals.remarks import Remark
+from motionloom.goals.expected import FLOOR, missing
+from motionloom.goals.remarks import Remark, clipped, replacement_line
 from motionloom.goals.segment import Segment
 from motionloom.goals.verbs import in_plainer_words
 from motionloom.motion import Motion
@@ -33,11 +33,8 @@ def attempt_seed(seed: int, number: int) -> int:
     return seed if number == 0 else row_seed(seed, number) % LARGEST_SEED
 
 
-def replacement_line(texts: Iterable[tuple[str, str]]) -> str:
-    """A sentence with texts that are generated as others; empty where none is."""
-    changed = dict.fromkeys((one, other) for one, other in texts if one != other)
-    both_ways = ", ".join(f"'{one}' is generated as '{other}'" for one, other in changed)
-    return both_ways and f"{both_ways}, which these weights know better"
+PLAINER_FROM = 2
+"""The attempt from which on the words are plainer ones; those before are of the words as they stand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +51,10 @@ class Reattempted:
         """A remark on each text that was replaced, and on each block that does not show what it should."""
         replaced = {segments[i].text: text for i, text in self.again.items() if text != segments[i].text}
         remarks = [Remark(one, replacement_line([(one, other)])) for one, other in replaced.items()]
-        for i, names in self.missing.items():
+        for i, missed in self.missing.items():
             text = segments[i].text
-            remarks.append(Remark(text, f"'{text}': not found in {ATTEMPTS} attempts: {', '.join(names)}"))
+            if names := [name for name in missed if name != FLOOR]:  # who floats is lowered
+                remarks.append(Remark(text, clipped(f"'{text[:40]}': not shown: {', '.join(names)}")))
         return remarks
 
 
@@ -98,10 +96,11 @@ def reattempt(
             for number in range(1, attempts):
                 if not best[i]:
                     break
-                again = _sample_again(timed, motion, i, plain[i], number, start, progress)
+                words = plain[i] if number >= PLAINER_FROM else timed.segments[i].text
+                again = _sample_again(timed, motion, i, words, number, start, progress)
                 found = unseen(again, near)
                 if _total(found) < _total({k: best[k] for k in found}):
-                    motion, best, kept[i] = again, best | found, plain[i]
+                    motion, best, kept[i] = again, best | found, words
     return Reattempted(motion, kept, {i: names for i, names in best.items() if names})
 
 

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from motionloom.goals.adapters import Applied
+from motionloom.goals.expected import climbs
 from motionloom.goals.goal import Goal
 from motionloom.goals.hold import FixedJoints
 from motionloom.goals.remarks import Remark
 from motionloom.goals.segment import Segment
-from motionloom.goals.timeline import Timeline, single_segment
+from motionloom.goals.timeline import Timeline, single_segment, with_goals_read
 from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
@@ -26,7 +27,7 @@ from motionloom.tasks import control, duet, edit, long, pair, predict, reattempt
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
-from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated, remarks_on_air
+from motionloom.tasks.supported import add_support, add_support_between, is_elevated, lowered, remarks_on_air
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -229,6 +230,8 @@ def chain_progress(progress: Progress, steps: int, rows: int) -> Moves:
 def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     assert plan.timeline is not None
     segments, lock = long.load_segment_adapters(models.prior, plan.timeline.segments), plan.values.foot_lock
+    if plan.timeline.path is None and not getattr(plan.values, "literal", True):
+        segments = with_goals_read(segments)
     takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]
     progress = _Reported(progress)
     if (
@@ -293,7 +296,8 @@ def _held_to_words(
     blocks = range(len(timed.segments)) if changed is None else changed
     seconds = sum(timed.segments[i].seconds for i in blocks)
     if getattr(plan.values, "literal", True) or seconds > reattempts.LONGEST:
-        return Result((motion,), blocks=timed.blocks)
+        on_floor = timed.foot_lock and plan.timeline and not plan.timeline.asks and not _climbs(timed.segments)
+        return Result((lowered(motion) if on_floor else motion,), blocks=timed.blocks)
     found = reattempts.reattempt(timed, motion, blocks, start=plan.start, progress=progress.repeat)
     motion, notes = found.motion, found.notes(timed.segments)
     goals = [timed.path, *(segment.goal for segment in timed.segments)]

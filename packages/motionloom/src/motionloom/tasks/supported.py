@@ -4,12 +4,13 @@ Each of these leaves a motion that has nothing of the kind as it is.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from motionloom.edits.fitting import fit
+from motionloom.goals.expected import climbs, floating
 from motionloom.goals.goal import Goal
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
@@ -18,19 +19,11 @@ from motionloom.kinematics.stairs import stairs as find_stairs
 from motionloom.motion import Motion
 from motionloom.retarget import joints22
 
-_CLIMB = re.compile(
-    r"\b(?:(?:up|down)?stairs?|stairway|staircase|ladder|climb\w*|(?:up|down) (?:the|some|a few|a flight of) steps)\b"
-)
 _JUMP = re.compile(r"\b(?:jump|hop|leap)\w*")
 SUNK = 0.02
 """Metres by which a hand or the head may be under the floor."""
 REST = {WRISTS[0]: 0.02, WRISTS[1]: 0.02, J["head"]: 0.06}
 """Metres over the floor where the joint of a hand, and of the head, comes to lie."""
-
-
-def climbs(texts: Iterable[str]) -> bool:
-    """Whether some words are of stairs, of a ladder, or of climbing."""
-    return any(_CLIMB.search(text.lower()) for text in texts)
 
 
 def remarks_on_air(
@@ -67,9 +60,11 @@ def add_support(motion: Motion, *, stairs: bool = True) -> Motion:
     """
     places = motion.positions()
     if hovering(places, motion.fps) or falls_from_above(places, motion.fps):
-        motion = _grounded(motion, places)
+        motion = _dropped(motion, np.maximum(places[..., 1].min(axis=1), 0.0))
     elif stairs:
         motion = _on_stairs(motion, places)
+    else:
+        motion = lowered(motion)
     places, goal = motion.positions(), Goal.nothing(len(motion))
     for joint, rest in REST.items():
         sunk = places[:, joint, 1] < rest - SUNK
@@ -91,6 +86,15 @@ def add_support_between(motion: Motion, spans: Sequence[tuple[int, int]]) -> Mot
     )
 
 
+def lowered(motion: Motion) -> Motion:
+    """The motion with whoever floats on the floor (`floating`); the same where nobody does."""
+    lowest = motion.positions()[..., 1].min(axis=1)
+    drop = np.zeros(len(motion))
+    for first, end in floating(motion.positions(), motion.fps):
+        drop[first:end] = lowest[first:end]
+    return _dropped(motion, drop) if drop.any() else motion
+
+
 def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
     flight = find_stairs(places, motion.fps)
     if flight is None:
@@ -108,7 +112,8 @@ def _on_stairs(motion: Motion, places: np.ndarray) -> Motion:
     return fit(replace(motion, root=motion.root + lift[:, None] * np.array([0.0, 1.0, 0.0])), goal)
 
 
-def _grounded(motion: Motion, places: np.ndarray) -> Motion:
-    """Lowered by as much as the lowest joint is above the floor, a quarter of a second averaged."""
-    drop = smooth(np.maximum(places[..., 1].min(axis=1), 0.0), odd(motion.fps / 4))
+def _dropped(motion: Motion, drop: np.ndarray) -> Motion:
+    """Lowered by metres (frames,), a quarter of a second averaged, and not into the floor."""
+    lowest = motion.positions()[..., 1].min(axis=1)
+    drop = np.minimum(smooth(drop, odd(motion.fps / 4)), np.maximum(lowest, 0.0))
     return clean_feet(replace(motion, root=motion.root - drop[:, None] * np.array([0.0, 1.0, 0.0])))

@@ -22,9 +22,9 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
-from motionloom.goals.expected import missing
+from motionloom.goals.expected import climbs, missing
 from motionloom.goals.heads import head_said
-from motionloom.goals.remarks import numbers_read, parts_read
+from motionloom.goals.remarks import clipped, numbers_read, parts_read, replacement_line
 from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
@@ -34,12 +34,12 @@ from motionloom.requests.sampling import SOLVER, Sampling, Settings
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
 from motionloom.tasks.long import compose
-from motionloom.tasks.reattempts import ATTEMPTS, attempt_seed, reattempt, replacement_line
+from motionloom.tasks.reattempts import ATTEMPTS, PLAINER_FROM, attempt_seed, reattempt
 from motionloom.tasks.redraw import Timed
 from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenate
-from motionloom.tasks.supported import add_support
+from motionloom.tasks.supported import add_support, lowered
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.tasks.watching import watching
 from motionloom.weights.prior import Prior
@@ -120,20 +120,17 @@ class Worded:
     @property
     def replaced(self) -> str:
         """A sentence with the common verbs that replace rare ones; empty where none does."""
-        if self.said is None:
-            return ""
-        both = zip(self.said.segments, self.timeline.segments, strict=True)
+        both = zip((self.said or self.timeline).segments, self.timeline.segments, strict=True)
         return replacement_line([(one.text, other.text) for one, other in both])
 
     @property
     def shortfalls(self) -> list[str]:
-        """A sentence for verbs that were replaced, for each number that was missed, for what is not shown, and for an
-        end where nothing happens."""
+        """A sentence for replaced verbs, each missed number, what is not shown, and an end without motion."""
         share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
-        looked = self.attempts > 1 and self.missing
-        unseen = f"not found in {self.attempts} attempts: {', '.join(self.missing)}" if looked else ""
-        problems = [amount.problem for amount in self.amounts]
-        return [*filter(None, [self.replaced, *problems, unseen, self.stillness(of=share)])]
+        looked = list(dict.fromkeys(self.missing)) if self.attempts > 1 else []
+        unseen = clipped(f"not shown in {self.attempts} attempts: {', '.join(looked)}") if looked else ""
+        problems = [self.replaced, *(amount.problem for amount in self.amounts)]
+        return [*filter(None, [*problems, unseen, self.stillness(of=share)])]
 
     @property
     def still_from(self) -> float | None:
@@ -157,7 +154,7 @@ class Worded:
             or self.motion.seconds - begin < of * self.motion.seconds
         ):
             return ""
-        return f"it ends standing still, from {begin:.1f} s on: what these weights do not know often does"
+        return f"it stands still from {begin:.1f} s on"
 
 
 def read(
@@ -263,24 +260,24 @@ def generate_timelines(
                 some = several[begin : begin + _TOGETHER]
                 own = seeds[done : done + len(some)]
                 best = _best_attempts(prior, some, seeds=own, sampling=sampling, progress=progress, **how)
-                yield from map(_with_heads, best)
+                yield from (_finished(one, foot_lock) for one in best)
                 done += len(some)
             continue
         for one in several:
             best_try = _best_try(prior, one, sampling=replace(sampling, count=1), seed=seeds[done], **how)
-            yield _with_heads(best_try)
+            yield _finished(best_try, foot_lock)
             done += 1
             if progress:
                 progress(done, len(timelines))
 
 
-def _with_heads(one: Worded) -> Worded:
-    """The motion with a head that does what the words of each segment say of it, where words are looked for at all."""
-    if one.attempts == 1:
-        return one
-    motion = one.motion
-    for segment, (first, last) in zip(one.timeline.segments, pairwise(one.timeline.begins), strict=True):
-        if move := head_said(segment.text):
+def _finished(one: Worded, foot_lock: bool) -> Worded:
+    """The motion with whoever floats on the floor, unless the words climb, and with a head that does what the words
+    of each segment say of it, where words are looked for at all."""
+    segments = one.timeline.segments
+    motion = lowered(one.motion) if foot_lock and not climbs(part.text for part in segments) else one.motion
+    for segment, (first, last) in zip(segments, pairwise(one.timeline.begins), strict=True):
+        if one.attempts > 1 and (move := head_said(segment.text)):
             motion = Nod(((first / FPS, last / FPS),), move=move).apply(None, motion, 0)
     return one if motion is one.motion else replace(one, motion=motion)
 
@@ -301,7 +298,7 @@ def _best_attempts(
     unseen, finished = list(range(len(timelines))), 0
     first, later = _once_at_its_end(progress)
     for number in range(attempts):
-        words = plainer if number else timelines
+        words = plainer if number >= PLAINER_FROM else timelines
         sampled = generate_each(
             prior,
             [words[i].segments[0].text for i in unseen],
@@ -314,7 +311,7 @@ def _best_attempts(
         again = set(unseen)
         for place, motion in _unwatched(sampled) if number else sampled:
             i = unseen[place]
-            attempt = _or_mirrored(Worded(motion, words[i], (), attempts, timelines[i] if number else None))
+            attempt = _or_mirrored(Worded(motion, words[i], (), attempts, timelines[i]))
             if i not in best or len(attempt.missing) < len(best[i].missing):
                 best[i] = attempt
             if number + 1 == attempts or not best[i].missing:
@@ -356,10 +353,10 @@ def _best_try(
     in_blocks = attempts > 1 and len({segment.text for segment in timeline.segments}) > 1
     for number in range(TRIES if counts else 1 if in_blocks else attempts):
         said = _scaled(timeline, shares)
-        now = said.plainer if number else said
+        now = said.plainer if number >= PLAINER_FROM else said
         own = replace(sampling, seed=attempt_seed(seed, number), first=0)
         motion = _sample_timeline(prior, now, own, foot_lock)
-        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said if number else None)
+        candidate = Worded(motion, now, _measure_amounts(now, motion), attempts, said)
         candidate = _or_mirrored(candidate)
         off = _missed(candidate)
         if best is None or off < least:
@@ -375,7 +372,8 @@ def _best_try(
         own = replace(sampling, seed=seed, first=0)
         best = _blocks_again(best, Timed(prior, best.timeline.segments, None, own, foot_lock))
     several = len(timeline.segments) > 1
-    return replace(best, motion=add_support(best.motion)) if several and foot_lock else best
+    stairs = climbs(segment.text for segment in timeline.segments)
+    return replace(best, motion=add_support(best.motion, stairs=stairs)) if several and foot_lock else best
 
 
 def _missed(one: Worded) -> tuple[float, int]:

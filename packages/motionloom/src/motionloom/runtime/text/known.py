@@ -74,9 +74,8 @@ class Nearest:
 
     def remark(self) -> str:
         """One line for somebody whose prompt is not near to anything."""
-        sentences = ", ".join(f"'{sentence}'" for sentence in self.sentences)
         prompt = _short(bare(self.prompt) or self.prompt.strip())
-        return one_line(f"these weights have seen nothing like '{prompt}'; nearest: {sentences}")
+        return one_line(f"these weights have seen nothing like '{prompt}'; nearest: '{_short(self.sentences[0])}'")
 
 
 def stem(word: str) -> str:
@@ -158,7 +157,7 @@ def _farthest_first(vectors: NDArray[np.float32], sure: int, most: int) -> list[
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= 24 else text[:21] + "..."
 
 
 # In a weight file: int8 vectors with a scale each, and plain data
