@@ -12,6 +12,7 @@ from motionloom_train.data.build import _with_mirror
 from motionloom_train.data.clips import MEASURED, Clip, Note, read_clip, write_clip
 from motionloom_train.data.measured import BASES, ROWS, measure_facts, measured_notes, sentences_of
 from motionloom_train.data.sets import Item
+from motionloom_train.data.starts import nearest
 from motionloom_train.data.words import LABELS, mirror_text
 from tests.kinematics import people
 
@@ -150,7 +151,7 @@ def test_notes_survive_the_file(tmp_path) -> None:
 def test_measured_words_are_sampled_as_often_as_they_should() -> None:
     """Beside an action and a label that are always there, by their shares."""
     items = [Item(0, 60, group, (0,)) for group in ("action:bow", "walk", MEASURED + "walk")]
-    pool = Pool.of(items, 48, {})
+    pool = Pool.of(items, 48, {}, nearest(np.ones(60, dtype=bool)))
     often = dict(zip(pool.numbers.tolist(), np.diff(pool.often, prepend=0.0), strict=True))
     total = SHARE["action"] + SHARE["label"] + SHARE["measured"]
     assert [round(often[k], 6) for k in range(3)] == [

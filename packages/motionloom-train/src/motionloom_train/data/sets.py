@@ -35,7 +35,8 @@ def table() -> dict[str, dict[str, list[str]]]:
     for group, idioms in read_table("motionloom_train.data", "idioms.toml").items():
         row = sentences.setdefault(group, {})
         rng = np.random.default_rng(zlib.crc32(group.encode()))
-        row["says"] = [*row.get("says", []), *idioms.get("says", []), *_worded_idioms(idioms.get("verbs", []), rng)]
+        says = [*row.get("says", []), *idioms.get("says", []), *_worded_idioms(idioms.get("verbs", []), rng)]
+        row["says"] = list(dict.fromkeys(says))
         row["sided"] = [*row.get("sided", []), *_worded_idioms(idioms.get("sided", []), rng)]
     return sentences
 

@@ -52,7 +52,10 @@ def parse_json(data: bytes | str, what: Path | str) -> Any:
     Raises `MotionloomError` that begins with ``what``.
     """
     value = _json(data, what, unique=True)
-    check_texts(value, str(what))
+    try:
+        check_texts(value, "a text")
+    except MotionloomError as error:
+        raise MotionloomError(f"{what}: {error}") from None
     return value
 
 
