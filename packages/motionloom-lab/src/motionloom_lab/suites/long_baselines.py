@@ -6,7 +6,7 @@ by h / 2 at each seam.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, TypeAlias, Unpack
 
@@ -42,18 +42,24 @@ Method: TypeAlias = Callable[[Sequence[str], Sequence[int], int], Long]
 
 
 def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) -> dict[str, Method]:
-    """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not, and for none."""
-    chosen = list(dict.fromkeys(DEFAULT if names is None else names))
-    if not chosen:
+    """The rows of the protocol's table and the named ways, in that order (default `DEFAULT`).
+
+    Raises MotionloomError for a name there is not, and for none.
+    """
+    rows = {name: partial(_variant, name=name) for name in how.variants}
+    usual = () if rows else DEFAULT
+    chosen = list(dict.fromkeys(usual if names is None else names))
+    if not chosen and not rows:
         raise MotionloomError(f"no method is named; the methods are {', '.join(_MAKERS)}")
     for name in chosen:
         if name not in _MAKERS:
             raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(_MAKERS)}")
 
     def method(name: str) -> Method:
-        return lambda prompts, frames, seed: _MAKERS[name][1](Request(prior, how, prompts, frames, seed))
+        make = rows.get(name) or _MAKERS[name][1]
+        return lambda prompts, frames, seed: make(Request(prior, how, prompts, frames, seed))
 
-    return {name: method(name) for name in chosen}
+    return {name: method(name) for name in (*rows, *chosen)}
 
 
 def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
@@ -112,13 +118,23 @@ def _double_take(
     request: Request, mode: Literal["published", "paper"] = "published", **more: Unpack[TakeSettings]
 ) -> Long:
     how = request.how
-    settings: TakeSettings = {**how.drawing, **more}
+    shares = {"soft": how.soft, "hard": how.hard, "restart": how.restart}
+    chosen = {name: share for name, share in shares.items() if share is not None}
+    settings: TakeSettings = {**how.drawing, **chosen, **more}  # type: ignore[typeddict-item]
     rows = rows_of(request.frames, how.handshake)
-    joins = {"handshake": how.handshake, "ramp": how.blend}
+    joins = {"handshake": how.handshake, "ramp": how.ramp}
     features, _ = double_take_features(
         request.prior, request.prompts, rows, mode=mode, seed=request.seed, **joins, **settings
     )
     return from_features(features)
+
+
+def _variant(request: Request, *, name: str) -> Long:
+    """A row of the protocol's table."""
+    changes = dict(request.how.variants[name])
+    takes: TakeSettings = {key: changes.pop(key) for key in [*changes] if key.endswith("_take_only")}  # type: ignore[assignment]
+    how = replace(request.how, **changes)
+    return _double_take(replace(request, how=how), mode=how.mode, **takes)  # type: ignore[arg-type]
 
 
 def _slerp(request: Request) -> Long:
