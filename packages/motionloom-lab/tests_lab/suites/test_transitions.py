@@ -51,7 +51,8 @@ def trial(how: Transitions = HOW, *, people: int = 40, crops: bool = True) -> tr
     items = [item(k, 64 + 4 * (k % 30)) for k in range(people)]
     real = text_reference.measure(items, judge, Selection())
     cut = real_seams.SeamCrops.of([one.features for one in items], how.window, judge) if crops else None
-    return transitions.prepare(judge, real, how, cut, real_seams.load_shipped())
+    short = real_seams.SeamCrops.of([one.features for one in items], how.handshake, judge) if crops else None
+    return transitions.prepare(judge, real, how, cut, real_seams.load_shipped(), handshakes=short)
 
 
 def test_cuts_and_windows_are_the_papers_own() -> None:
@@ -246,7 +247,8 @@ def test_too_little_real_motion_is_refused(how: Transitions, said: str) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"steps": 0}, {"replications": 0}, {"rows": "table9"}, {"mode": "mine"}, {"ramp": -1}] + [{"guidance": float("inf")}, {"seed": -1}, {"margin": 1000}, {"intervals": 0}],
+    [{"steps": 0}, {"replications": 0}, {"rows": "table9"}, {"mode": "mine"}, {"ramp": -1}]
+    + [{"guidance": float("inf")}, {"seed": -1}, {"margin": 1000}, {"intervals": 0}],
 )
 def test_settings_that_cannot_be_are_refused(change: dict) -> None:
     with pytest.raises(MotionloomError):

@@ -353,9 +353,7 @@ class TakeSettings(TypedDict, total=False):
     """T' as a share of all levels, above 0 and at most 1: where the second take starts."""
 
 
-def adjusted(
-    mode: str, *, soft: float | None = None, hard: float | None = None, restart: float | None = None
-) -> Mode:
+def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None, restart: float | None = None) -> Mode:
     """A mode with another M_soft, M_hard or T' (None: the mode's own), see `TakeSettings`.
 
     Raises MotionloomError for an unknown mode and for shares that are none.

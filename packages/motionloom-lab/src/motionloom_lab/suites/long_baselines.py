@@ -15,6 +15,7 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.features.representation import HUMANML3D, of_width
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.tasks.long import compose, long_features
@@ -29,10 +30,10 @@ Array: TypeAlias = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Long:
-    """One long motion at 20 frames per second."""
+    """One long motion at the frame rate of its representation."""
 
     features: Array
-    """(frames, 263), not standardised: what the evaluator reads."""
+    """(frames, numbers), not standardised: what the evaluator reads."""
     positions: Array
     """(frames, 22, 3) metres: what the physical numbers read."""
 
@@ -47,13 +48,16 @@ def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) 
     Raises MotionloomError for a name there is not, and for none.
     """
     rows = {name: partial(_variant, name=name) for name in how.variants}
-    usual = () if rows else DEFAULT
+    only = () if of_width(len(prior.mean)) is HUMANML3D else BODIES
+    usual = () if rows else [name for name in DEFAULT if name not in only]
     chosen = list(dict.fromkeys(usual if names is None else names))
     if not chosen and not rows:
         raise MotionloomError(f"no method is named; the methods are {', '.join(_MAKERS)}")
     for name in chosen:
         if name not in _MAKERS:
             raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(_MAKERS)}")
+        if name in only:
+            raise MotionloomError(f"the method {name!r} needs weights of {HUMANML3D}; these draw {len(prior.mean)}")
 
     def method(name: str) -> Method:
         make = rows.get(name) or _MAKERS[name][1]
@@ -72,7 +76,7 @@ def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
 def from_features(features: np.ndarray) -> Long:
     """Features as the network samples them, decoded once."""
     numbers = features.astype(np.float64)
-    return Long(numbers, humanml.decode_positions(numbers))
+    return Long(numbers, of_width(numbers.shape[1]).decode_positions(numbers))
 
 
 def from_positions(positions: Array) -> Long:
@@ -95,10 +99,10 @@ class Request:
     @property
     def segments(self) -> list[Segment]:
         """The prompts with their seconds."""
-        return [Segment(text, n / FPS) for text, n in zip(self.prompts, self.frames, strict=True)]
+        return [Segment(text, n / self.prior.fps) for text, n in zip(self.prompts, self.frames, strict=True)]
 
     def alone(self, frames: Sequence[int]) -> list[np.ndarray]:
-        """Every prompt by itself, (frames, 263) each."""
+        """Every prompt by itself, (frames, numbers) each."""
         seeds = [self.seed + row for row in range(len(self.prompts))]
         return sample_features(self.prior, self.prompts, frames, seeds=seeds, **self.how.drawing)
 
@@ -156,6 +160,8 @@ _MAKERS: Mapping[str, tuple[str, Callable[[Request], Long]]] = {
     "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
     "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),
 }
+BODIES = ("ours", "ours-exported", "slerp")
+"""Ways that go through HumanML3D's numbers."""
 DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
 """Without second take only and without the slow ones of 1000 steps."""
 TITLES = {name: title for name, (title, _) in _MAKERS.items()}

@@ -14,6 +14,7 @@ from typing import Any, Literal, TypedDict
 from motionloom.diffusion import SOLVERS
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.features.representation import Representation
 from motionloom.reading import read_table
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 
@@ -74,7 +75,7 @@ class Transitions:
     """Long motions out of several captions, and the stretches around their seams (PriorMDM's protocol)."""
 
     handshake: int = 20
-    """Frames that two neighbours share: 20 for HumanML3D, 30 for BABEL."""
+    """Frames that two neighbours share: 20 for HumanML3D, 30 for BABEL (`Transitions.of`)."""
     margin: int = 40
     """Frames around the handshake that belong to the transition, half on either side."""
     unfoldings: int = 2
@@ -86,6 +87,8 @@ class Transitions:
     restart: float | None = None
     rows: str = ""
     """A table of ``tables.toml`` whose rows are measured; empty: none."""
+    clip: int = 196
+    """Frames of the longest motion that the priors saw."""
     mode: str = "paper"
     """DoubleTake of the rows of a table: as the paper describes it, or ``published`` as the released code has it."""
     intervals: int = 32
@@ -112,6 +115,11 @@ class Transitions:
         """Frames of a transition: 60 for HumanML3D."""
         return self.handshake + self.margin
 
+    @staticmethod
+    def of(kind: Representation) -> "Transitions":
+        """The usual protocol for a representation: a handshake of one second."""
+        return Transitions(handshake=kind.second, clip=kind.longest)
+
     @property
     def variants(self) -> Mapping[str, Mapping[str, Any]]:
         """Settings of the rows of the table, by their names."""
@@ -126,9 +134,9 @@ class Transitions:
 
     @property
     def longest(self) -> int:
-        """Visible frames at most: with both handshakes a row then has the 196 that HumanML3D's priors saw."""
+        """Visible frames at most: with both handshakes a row then has as many as the priors saw."""
         handshakes = (row.get("handshake", self.handshake) for row in self.variants.values())
-        return max(self.shortest, 196 - max(self.handshake, *handshakes, 0))
+        return max(self.shortest, self.clip - max(self.handshake, *handshakes, 0))
 
     @property
     def seams(self) -> int:
