@@ -208,7 +208,7 @@ def test_published_weights_are_those_of_the_released_code() -> None:
 
 
 def test_soft_and_hard_are_the_ends_of_the_ramp_and_the_modes_keep_the_rest() -> None:
-    """b = 2: half way and all the way from M_soft to M_hard; the released code keeps its handshake, the paper's is soft."""
+    """b = 2: half way and all the way from one to the other; only the paper's handshake is soft."""
     plan = Plan.of([40, 40], 4, 2)
     paper = keep_weights(plan, adjusted("paper", soft=0.2, hard=0.6).keep)[0]
     assert paper[29:39] == pytest.approx([1, 0.6, 0.4, *[0.2] * 4, 0.4, 0.6, 1])

@@ -13,10 +13,11 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
 from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.transitions import JERK_HUMANML3D
+from motionloom_lab.papers.double_take import rows_of
 from motionloom_lab.report import report
 from motionloom_lab.suites import long_baselines, real_seams, text_reference, transitions
 from motionloom_lab.suites.harness import Parts, Run
-from motionloom_lab.suites.long_baselines import DEFAULT, Long, methods, rows_of, titled
+from motionloom_lab.suites.long_baselines import DEFAULT, Long, methods, titled
 from motionloom_lab.suites.protocol import Selection, Transitions, quick_transitions
 from motionloom_lab.suites.registry import chosen
 from tests.recorded import tiny
@@ -247,8 +248,10 @@ def test_too_little_real_motion_is_refused(how: Transitions, said: str) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"steps": 0}, {"replications": 0}, {"rows": "table9"}, {"mode": "mine"}, {"ramp": -1}]
-    + [{"guidance": float("inf")}, {"seed": -1}, {"margin": 1000}, {"intervals": 0}],
+    [
+        *({"steps": 0}, {"replications": 0}, {"guidance": float("inf")}, {"seed": -1}, {"margin": 1000}),
+        *({"intervals": 0}, {"rows": "table9"}, {"mode": "mine"}, {"ramp": -1}),
+    ],
 )
 def test_settings_that_cannot_be_are_refused(change: dict) -> None:
     with pytest.raises(MotionloomError):

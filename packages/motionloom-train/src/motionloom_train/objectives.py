@@ -71,7 +71,7 @@ class WordBank:
         self.tokens, self.pooled = tensor(np.concatenate(tokens), device), tensor(np.concatenate(pooled), device)
 
     def condition(self, texts: Tensor, lengths: Tensor, flags: Tensor | None = None) -> Condition:
-        """The condition of a batch: numbers of sentences (rows,), valid frames (rows,), perhaps flags (rows, frames)."""
+        """The condition of a batch: numbers of sentences and valid frames (rows,), perhaps flags (rows, frames)."""
         device = self.tokens.device
         texts, lengths = texts.to(device), lengths.to(device)
         first, counts = self.starts[texts], self.starts[texts + 1] - self.starts[texts]
@@ -234,7 +234,7 @@ STANDING = 0.01
 def geometric_error(
     denoised: Tensor, clean: Tensor, lengths: Tensor, mean: Tensor, std: Tensor, *, kind: Representation
 ) -> Tensor:
-    """MDM's geometric losses, each of weight 1 (Tevet et al. 2023, eq. 3 to 5), for numbers that `Representation` decodes.
+    """MDM's geometric losses, each of weight 1 (Tevet et al. 2023, eq. 3 to 5), for any `Representation`.
 
     Squared errors, meaned over valid frames and numbers of each row, then over rows: of the joints' places in the world
     (metres), of the frame-to-frame differences of the standardised numbers but for the root's three, and of the steps

@@ -375,6 +375,13 @@ def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None,
     return replace(chosen, keep=keep, restart=chosen.restart if restart is None else restart)
 
 
+def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
+    """Row lengths of DoubleTake whose unfolded frames and seams are those of the visible ``frames``."""
+    half, last = handshake // 2, len(frames) - 1
+    rest = handshake - half
+    return [n + (half if i > 0 else 0) + (rest if i < last else 0) for i, n in enumerate(frames)]
+
+
 def double_take_features(
     prior: Prior,
     prompts: Sequence[str],

@@ -22,7 +22,7 @@ from motionloom.tasks.long import compose, long_features
 from motionloom.tasks.text import sample_features
 from motionloom.weights.prior import Prior
 from motionloom_lab.papers.baselines import BLANK, slerp_joined
-from motionloom_lab.papers.double_take import TakeSettings, double_take_features
+from motionloom_lab.papers.double_take import TakeSettings, double_take_features, rows_of
 from motionloom_lab.suites.protocol import Transitions
 
 Array: TypeAlias = np.ndarray
@@ -64,13 +64,6 @@ def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) 
         return lambda prompts, frames, seed: make(Request(prior, how, prompts, frames, seed))
 
     return {name: method(name) for name in (*rows, *chosen)}
-
-
-def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
-    """Row lengths of DoubleTake whose unfolded frames and seams are those of the visible ``frames``."""
-    half, last = handshake // 2, len(frames) - 1
-    rest = handshake - half
-    return [n + (half if i > 0 else 0) + (rest if i < last else 0) for i, n in enumerate(frames)]
 
 
 def from_features(features: np.ndarray) -> Long:
@@ -160,8 +153,8 @@ _MAKERS: Mapping[str, tuple[str, Callable[[Request], Long]]] = {
     "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
     "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),
 }
-BODIES = ("ours", "ours-exported", "slerp")
-"""Ways that go through HumanML3D's numbers."""
+BODIES = ("ours-exported", "slerp")
+"""Ways that place a body by HumanML3D's numbers."""
 DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
 """Without second take only and without the slow ones of 1000 steps."""
 TITLES = {name: title for name, (title, _) in _MAKERS.items()}

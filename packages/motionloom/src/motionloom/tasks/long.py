@@ -22,7 +22,7 @@ from motionloom.diffusion import lerp
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.features.layout import FPS, WIDTH
 from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
@@ -37,7 +37,7 @@ from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
-from motionloom.tasks.text import check_humanml
+from motionloom.tasks.text import check_features, check_humanml, finish, joint_positions
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
@@ -155,6 +155,28 @@ def compose_takes(
         yield concatenate(*solve_stream(own, prior.fps, foot_lock=foot_lock))
 
 
+def compose_unplaced(
+    prior: Prior,
+    segments: Sequence[Segment],
+    *,
+    foot_lock: bool = True,
+    sampling: Sampling | None = None,
+    progress: Moves | None = None,
+    **settings: Unpack[Settings],
+) -> Iterator[Motion]:
+    """As many motions of the same segments as ``count`` says, of any numbers that become a motion, BABEL's too.
+
+    The arguments are those of `compose`. Raises `MotionloomError` for segments with goals: no place is asked for.
+    """
+    check_features(prior)
+    chosen = Sampling.of(sampling, settings)
+    if any(segment.goal is not None for segment in segments):
+        check_humanml(prior, "goals need")
+    pieces = long_features(prior, segments, sampling=chosen, progress=progress)
+    for _ in range(chosen.number()):
+        yield finish(prior, np.concatenate(list(islice(pieces, len(segments)))), foot_lock=foot_lock)
+
+
 def _prepare(
     prior: Prior, sampling: Sampling, start: Motion | None, path: Goal | None
 ) -> "tuple[Past | None, Track | None, GroundPose]":
@@ -176,7 +198,7 @@ def long_features(
     progress: Moves | None = None,
     **settings: Unpack[Settings],
 ) -> Iterator[np.ndarray]:
-    """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
+    """Features (frames, numbers), not standardised, one piece per segment; strung together they are the long motion.
 
     Piece i has ``round(seconds * fps)`` frames, the first and the last one more by ``past``. begin: as of
     `watching.Denoised`. ``batch_size``: rows per network call; it changes speed and memory, not
@@ -199,7 +221,10 @@ def long_features(
         return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
     def poses(pieces: list[np.ndarray]) -> Array:
-        return PlacedMotion(np.concatenate(pieces), place).positions[None]
+        frames = np.concatenate(pieces)
+        if frames.shape[1] != WIDTH:
+            return joint_positions(prior, ((frames - prior.mean) / prior.std)[None])
+        return PlacedMotion(frames, place).positions[None]
 
     states = sample_chain(
         prior,
@@ -246,7 +271,7 @@ def chain_rows(
         after = overlap // 2 if following or behind is None else len(behind)
         length = before + frames + after
         own = adapted(segment.adapters).for_words(segment.text, *(one.text for one in beside[number : number + 1]))
-        bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
+        bound, null = (_bound(own, text, length, (2 * before, overlap)) for text in (segment.text, ""))
         edits = [holding_correction(past.known, prior, length)] if past and not number and len(past.known) else []
         if behind is not None and not following:
             edits.append(holding_correction(behind, prior, length, last=True))
@@ -258,6 +283,15 @@ def chain_rows(
         correct = _chain_corrections(edits)
         yield Row(segment.text, frames, before, after, overlap, scale, bound, null, correct, own.net)
         before, segment, number, lead = overlap // 2, following, number + 1, 0
+
+
+def _bound(prior: Prior, text: str, length: int, shared: tuple[int, int]) -> Bound:
+    """The condition of a row; networks that read transition flags see the frames it shares with either neighbour."""
+    cond = prior.condition([text], [length])
+    if prior.net.config.flags:
+        frames = np.arange(length)
+        cond = cond._replace(flags=((frames < shared[0]) | (frames >= length - shared[1])).astype(np.int64)[None])
+    return prior.net.bind(cond)
 
 
 def _eased_strength(scale: Callable[[int], float], share: np.ndarray, level: int) -> float:
@@ -337,11 +371,13 @@ def guided_estimates(
 
 
 def stack_conditions(bounds: list[Bound]) -> Bound:
-    """Rows of several conditions, their words padded to the longest."""
+    """Rows of several conditions, their words and flags padded to the longest."""
     most, padded = max(one.words.shape[-1] for one in bounds), []
+    frames = max(one.flags.shape[-1] for one in bounds)
     for one in bounds:
         keys, values = zero_padded(one.keys, most), zero_padded(one.values, most)
         padded.append(one._replace(keys=keys, values=values, words=zero_padded(one.words, most, axis=-1)))
+        padded[-1] = padded[-1]._replace(flags=zero_padded(one.flags, frames, axis=-1))
     return Bound._make(map(np.concatenate, zip(*padded, strict=True)))
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from motionloom.features.layout import WIDTH
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import Goal
 from motionloom.goals.hold import FixedJoints
@@ -229,6 +230,10 @@ def chain_progress(progress: Progress, steps: int, rows: int) -> Moves:
 def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     assert plan.timeline is not None
     segments, lock = long.load_segment_adapters(models.prior, plan.timeline.segments), plan.values.foot_lock
+    if len(models.prior.mean) != WIDTH and plan.start is None and plan.timeline.path is None and plan.previous is None:
+        moves = chain_progress(progress, plan.sampling.steps, plan.count * len(segments))
+        made = long.compose_unplaced(models.prior, segments, foot_lock=lock, sampling=plan.sampling, progress=moves)
+        return (Result((motion,)) for motion in made)
     takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]
     progress = _Reported(progress)
     if (
