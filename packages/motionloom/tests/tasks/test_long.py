@@ -17,9 +17,10 @@ from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.runtime.prior import PriorSession
-from motionloom.tasks.long import Past, compose, compose_takes, compose_unplaced, long_features
+from motionloom.tasks.long import Past, compose, compose_takes, long_features
 from motionloom.tasks.splice import move_rigidly
 from motionloom.tasks.text import sample_features
+from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny

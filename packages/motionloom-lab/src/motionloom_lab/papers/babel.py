@@ -384,7 +384,8 @@ def build_set(folders: Sequence[Path | str], out: Path | str, *, seed: int = 0, 
     if any((out / "clips").glob("*.safetensors")):
         raise MotionloomError(f"{out} holds clips already; build into another folder")
     (out / "clips").mkdir(parents=True, exist_ok=True)
-    counts, dropped = dict.fromkeys(SPLITS, 0), 0
+    counts: dict[str, int] = dict.fromkeys(SPLITS, 0)
+    dropped = 0
 
     def drop(reason: str) -> None:
         nonlocal dropped

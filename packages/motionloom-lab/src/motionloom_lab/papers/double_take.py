@@ -346,11 +346,11 @@ class TakeSettings(TypedDict, total=False):
     first_take_only: bool
     second_take_only: bool
     soft: float
-    """M_soft, 0 to 1: what the ramp keeps beside the handshake (in the paper's mode the handshake too)."""
+    """M_soft, 0 to 1: what the ramp keeps beside the handshake; in the paper's mode the handshake keeps as much."""
     hard: float
-    """M_hard, 0 to 1: what the ramp keeps away from the handshake."""
+    """M_hard, 0 to 1: what the ramp keeps at its other end."""
     restart: float
-    """T' as a share of all levels, above 0 and at most 1: where the second take starts."""
+    """T', where the second take starts: a share of all levels, above 0."""
 
 
 def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None, restart: float | None = None) -> Mode:
@@ -361,17 +361,15 @@ def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None,
     if mode not in MODES:
         raise MotionloomError(f"DoubleTake has no mode {mode!r}; there are {', '.join(MODES)}")
     chosen = MODES[mode]
-    shares = {"soft": soft, "hard": hard, "restart": restart}
-    for name, share in shares.items():
+    for name, share in {"soft": soft, "hard": hard, "restart": restart}.items():
         if share is not None and not 0 <= share <= 1:  # NaN too
             raise MotionloomError(f"DoubleTake's {name} is a share from 0 to 1; got {share:g}")
     if restart == 0:
         raise MotionloomError("the second take cannot start without noise; ask for a restart above 0")
     keep = chosen.keep
-    if soft is not None:
-        keep = replace(keep, low=soft, handshake=soft if keep.handshake == keep.low else keep.handshake)
-    if hard is not None:
-        keep = replace(keep, high=hard)
+    low = keep.low if soft is None else soft
+    joined = low if keep.handshake == keep.low else keep.handshake
+    keep = replace(keep, low=low, handshake=joined, high=keep.high if hard is None else hard)
     return replace(chosen, keep=keep, restart=chosen.restart if restart is None else restart)
 
 

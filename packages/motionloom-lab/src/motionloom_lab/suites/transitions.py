@@ -278,7 +278,7 @@ def run(
     how = how or Transitions.of(judge.representation)
     ways = _ways_of(run, beside, how, names, judge.representation)
     trial = real_motion(judge, run.data, selection, how, run.progress)
-    more = {"windows": trial.crops is not None}
+    more: dict[str, object] = {"windows": trial.crops is not None}
     if beside:
         more["beside"] = [digest(find_weights(weights)) for weights in beside]
     parts = run.parts({**how.sampling(), **run.settings(judge), "real": identity(trial.real), **more})

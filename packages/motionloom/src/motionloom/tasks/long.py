@@ -37,7 +37,7 @@ from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
-from motionloom.tasks.text import check_features, check_humanml, finish, joint_positions
+from motionloom.tasks.text import check_humanml, joint_positions
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
@@ -155,28 +155,6 @@ def compose_takes(
         yield concatenate(*solve_stream(own, prior.fps, foot_lock=foot_lock))
 
 
-def compose_unplaced(
-    prior: Prior,
-    segments: Sequence[Segment],
-    *,
-    foot_lock: bool = True,
-    sampling: Sampling | None = None,
-    progress: Moves | None = None,
-    **settings: Unpack[Settings],
-) -> Iterator[Motion]:
-    """As many motions of the same segments as ``count`` says, of any numbers that become a motion, BABEL's too.
-
-    The arguments are those of `compose`. Raises `MotionloomError` for segments with goals: no place is asked for.
-    """
-    check_features(prior)
-    chosen = Sampling.of(sampling, settings)
-    if any(segment.goal is not None for segment in segments):
-        check_humanml(prior, "goals need")
-    pieces = long_features(prior, segments, sampling=chosen, progress=progress)
-    for _ in range(chosen.number()):
-        yield finish(prior, np.concatenate(list(islice(pieces, len(segments)))), foot_lock=foot_lock)
-
-
 def _prepare(
     prior: Prior, sampling: Sampling, start: Motion | None, path: Goal | None
 ) -> "tuple[Past | None, Track | None, GroundPose]":
@@ -286,7 +264,7 @@ def chain_rows(
 
 
 def _bound(prior: Prior, text: str, length: int, shared: tuple[int, int]) -> Bound:
-    """The condition of a row; networks that read transition flags see the frames it shares with either neighbour."""
+    """The condition of a row; networks with transition flags see the frames it shares with either neighbour."""
     cond = prior.condition([text], [length])
     if prior.net.config.flags:
         frames = np.arange(length)

@@ -28,6 +28,7 @@ from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support, add_support_between, climbs, is_elevated, remarks_on_air
+from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -232,7 +233,7 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
     segments, lock = long.load_segment_adapters(models.prior, plan.timeline.segments), plan.values.foot_lock
     if len(models.prior.mean) != WIDTH and plan.start is None and plan.timeline.path is None and plan.previous is None:
         moves = chain_progress(progress, plan.sampling.steps, plan.count * len(segments))
-        made = long.compose_unplaced(models.prior, segments, foot_lock=lock, sampling=plan.sampling, progress=moves)
+        made = compose_unplaced(models.prior, segments, foot_lock=lock, sampling=plan.sampling, progress=moves)
         return (Result((motion,)) for motion in made)
     takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]
     progress = _Reported(progress)
