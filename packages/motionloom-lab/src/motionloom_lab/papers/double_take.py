@@ -362,10 +362,8 @@ def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None,
         raise MotionloomError(f"DoubleTake has no mode {mode!r}; there are {', '.join(MODES)}")
     chosen = MODES[mode]
     for name, share in {"soft": soft, "hard": hard, "restart": restart}.items():
-        if share is not None and not 0 <= share <= 1:  # NaN too
-            raise MotionloomError(f"DoubleTake's {name} is a share from 0 to 1; got {share:g}")
-    if restart == 0:
-        raise MotionloomError("the second take cannot start without noise; ask for a restart above 0")
+        if share is not None and not (0 <= share <= 1 and (share or name != "restart")):  # NaN too
+            raise MotionloomError(f"DoubleTake's {name} is a share from 0 to 1, restart above 0; got {share:g}")
     keep = chosen.keep
     low = keep.low if soft is None else soft
     joined = low if keep.handshake == keep.low else keep.handshake
@@ -375,9 +373,8 @@ def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None,
 
 def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
     """Row lengths of DoubleTake whose unfolded frames and seams are those of the visible ``frames``."""
-    half, last = handshake // 2, len(frames) - 1
-    rest = handshake - half
-    return [n + (half if i > 0 else 0) + (rest if i < last else 0) for i, n in enumerate(frames)]
+    half, rest = handshake // 2, handshake - handshake // 2
+    return [n + half * (i > 0) + rest * (i < len(frames) - 1) for i, n in enumerate(frames)]
 
 
 def double_take_features(

@@ -5,7 +5,7 @@ side, and neighbours agree on what they share at every level (`diffusion.stagger
 knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
 together, and a moving window of frames becomes positions and a body.
 
-The published procedure and that of the paper are in `lab.papers.double_take`; docs/decisions/0013 compares them.
+The published procedure is in `lab.papers.double_take`; docs/decisions/0013 compares them.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ from motionloom.diffusion import lerp
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.layout import FPS
 from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
@@ -37,7 +37,7 @@ from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
-from motionloom.tasks.text import check_humanml, joint_positions
+from motionloom.tasks.text import check_humanml, placed_positions
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
@@ -199,10 +199,7 @@ def long_features(
         return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
     def poses(pieces: list[np.ndarray]) -> Array:
-        frames = np.concatenate(pieces)
-        if frames.shape[1] != WIDTH:
-            return joint_positions(prior, ((frames - prior.mean) / prior.std)[None])
-        return PlacedMotion(frames, place).positions[None]
+        return placed_positions(prior, np.concatenate(pieces), place)[None]
 
     states = sample_chain(
         prior,
@@ -263,17 +260,15 @@ def chain_rows(
         before, segment, number, lead = overlap // 2, following, number + 1, 0
 
 
-def _bound(prior: Prior, text: str, length: int, shared: tuple[int, int]) -> Bound:
-    """The condition of a row; networks with transition flags see the frames it shares with either neighbour."""
-    cond = prior.condition([text], [length])
-    if prior.net.config.flags:
-        frames = np.arange(length)
-        cond = cond._replace(flags=((frames < shared[0]) | (frames >= length - shared[1])).astype(np.int64)[None])
-    return prior.net.bind(cond)
-
-
 def _eased_strength(scale: Callable[[int], float], share: np.ndarray, level: int) -> float:
     return float(eased(scale(level), share)[0])
+
+
+def _bound(prior: Prior, text: str, length: int, shared: tuple[int, int]) -> Bound:
+    """The condition of a row; networks with transition flags see the frames it shares with either neighbour."""
+    frames, cond = np.arange(length)[None], prior.condition([text], [length])
+    flags = np.int64((frames < shared[0]) | (frames >= length - shared[1]))
+    return prior.net.bind(cond._replace(flags=flags) if prior.net.config.flags else cond)
 
 
 def load_segment_adapters(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:
@@ -350,12 +345,12 @@ def guided_estimates(
 
 def stack_conditions(bounds: list[Bound]) -> Bound:
     """Rows of several conditions, their words and flags padded to the longest."""
-    most, padded = max(one.words.shape[-1] for one in bounds), []
-    frames = max(one.flags.shape[-1] for one in bounds)
+    most, frames = (max(getattr(one, part).shape[-1] for one in bounds) for part in ("words", "flags"))
+    padded: list[Bound] = []
     for one in bounds:
         keys, values = zero_padded(one.keys, most), zero_padded(one.values, most)
-        padded.append(one._replace(keys=keys, values=values, words=zero_padded(one.words, most, axis=-1)))
-        padded[-1] = padded[-1]._replace(flags=zero_padded(one.flags, frames, axis=-1))
+        words, flags = zero_padded(one.words, most, axis=-1), zero_padded(one.flags, frames, axis=-1)
+        padded.append(one._replace(keys=keys, values=values, words=words, flags=flags))
     return Bound._make(map(np.concatenate, zip(*padded, strict=True)))
 
 
