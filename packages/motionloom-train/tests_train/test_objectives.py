@@ -3,16 +3,25 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 from torch import nn
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FEET, LAYOUT, ric
+from motionloom.features.representation import BABEL
 from motionloom_train.data.batches import Batches
 from motionloom_train.data.sets import load_set
 from motionloom_train.nets.prior import Condition
-from motionloom_train.objectives import PLANTED, CleanError, WordBank, displacement_error, feature_scale
+from motionloom_train.objectives import (
+    PLANTED,
+    CleanError,
+    WordBank,
+    displacement_error,
+    feature_scale,
+    geometric_error,
+)
 from tests.kinematics.people import walking
 from tests.recorded import tiny
 from tests_train import runs
@@ -109,3 +118,54 @@ def test_only_rows_that_are_not_fresh_are_kept_near_the_teacher(tmp_path: Path) 
     assert net.value.grad is not None
     np.testing.assert_allclose(net.value.grad.item(), 2.0 * 2 * 2.0 * 0.75, rtol=1e-4)
     assert teacher.value.grad is None
+
+
+def standing_babel(frames: int) -> torch.Tensor:
+    """(1, frames, 135) of somebody in the T-pose who stands still."""
+    x = torch.zeros(1, frames, 135)
+    x[..., 0] = 0.95
+    x[..., 3:] = torch.tensor([1.0, 0, 0, 0, 1.0, 0]).repeat(22)
+    return x
+
+
+def geometric(denoised: torch.Tensor, clean: torch.Tensor, length: int) -> float:
+    mean, std = torch.zeros(135), torch.ones(135)
+    return float(geometric_error(denoised, clean, torch.tensor([length]), mean, std, kind=BABEL))
+
+
+def test_a_body_too_high_costs_its_places_alone() -> None:
+    """By hand: 0.3 m in one of three coordinates of every joint, and no change from frame to frame."""
+    clean = standing_babel(20)
+    denoised = clean.clone()
+    denoised[..., 0] += 0.3
+    assert geometric(clean, clean, 20) == 0
+    assert geometric(denoised, clean, 20) == pytest.approx(0.3**2 / 3, rel=1e-5)
+
+
+def test_standing_feet_that_slide_cost_their_steps_and_walking_feet_do_not() -> None:
+    """By hand: 0.2 m a frame along x, so place k is off by 0.2 k; four feet step 0.2 m in one of three coordinates. The
+    root's own numbers are no rotation, so that their differences cost nothing."""
+    clean = standing_babel(6)
+    denoised = clean.clone()
+    denoised[..., 1] = 0.2
+    places = np.mean([(0.2 * k) ** 2 / 3 for k in range(6)])
+    assert geometric(denoised, clean, 6) == pytest.approx(places + 0.2**2 / 3, rel=1e-5)
+    faster = clean.clone()
+    faster[..., 1] = 0.4
+    assert geometric(faster, denoised, 6) == pytest.approx(places, rel=1e-5)  # whose feet move in the data
+
+
+def test_rotations_that_jump_cost_their_differences() -> None:
+    """The first column of a hand's rotation scaled: no joint moves, and of 132 numbers one differs by 1 twice."""
+    clean = standing_babel(5)
+    denoised = clean.clone()
+    denoised[:, 2, 3 + 6 * 20] += 1.0
+    assert geometric(denoised, clean, 5) == pytest.approx(2 / 132 / 4, rel=1e-4)
+
+
+def test_geometric_losses_do_not_look_at_padding() -> None:
+    clean = standing_babel(12)
+    rubbish = clean.clone()
+    rubbish[:, 8:] = torch.randn(1, 4, 135, generator=torch.Generator().manual_seed(0))
+    assert geometric(rubbish, clean, 8) == pytest.approx(0, abs=1e-9)
+    assert geometric(rubbish, clean, 9) > 0.01

@@ -8,6 +8,7 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
+from motionloom.features.representation import HUMANML3D
 from motionloom_lab.evaluator import own
 from motionloom_lab.evaluator.agreement import Scored, agreement, within_prompts
 from motionloom_lab.evaluator.evaluators import Caption, load_evaluator
@@ -27,7 +28,7 @@ def features(positions: np.ndarray) -> np.ndarray:
 class Speedometer:
     """An evaluator that knows nothing but how fast a person goes: captions are numbers of metres per second."""
 
-    name = "speedometer"
+    name, representation = "speedometer", HUMANML3D
     about: dict[str, str] = {}  # noqa: RUF012
 
     def motions(self, motions: Sequence[np.ndarray]) -> np.ndarray:

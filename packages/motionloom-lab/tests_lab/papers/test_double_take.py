@@ -16,6 +16,7 @@ from motionloom_lab.papers.double_take import (
     Mode,
     Plan,
     Takes,
+    adjusted,
     double_take,
     double_take_features,
     first_take,
@@ -204,6 +205,25 @@ def test_published_weights_are_those_of_the_released_code() -> None:
     right = [0, 0.085, 0.17, 0.255, 0.34, 0.425, 0.51, 0.595, 0.68, 0.765]
     assert weights[50:90] == pytest.approx([*left, *[1.0] * 20, *right], abs=1e-6)
     assert set(weights[:50] + weights[90:]) == {1.0}
+
+
+def test_soft_and_hard_are_the_ends_of_the_ramp_and_the_modes_keep_the_rest() -> None:
+    """b = 2: half way and all the way from one to the other; only the paper's handshake is soft."""
+    plan = Plan.of([40, 40], 4, 2)
+    paper = keep_weights(plan, adjusted("paper", soft=0.2, hard=0.6).keep)[0]
+    assert paper[29:39] == pytest.approx([1, 0.6, 0.4, *[0.2] * 4, 0.4, 0.6, 1])
+    published = keep_weights(plan, adjusted("published", soft=0.2, hard=0.6).keep)[0]
+    assert published[30:38] == pytest.approx([0.6, 0.4, *[1] * 4, 0.2, 0.4])
+    assert adjusted("paper", restart=0.25).restart == 0.25
+    assert adjusted("paper") == MODES["paper"]
+
+
+@pytest.mark.parametrize(
+    "change", [{"soft": -0.1}, {"soft": 1.1}, {"hard": float("nan")}, {"restart": 0.0}, {"restart": 2.0}]
+)
+def test_shares_that_are_none_are_refused(change: dict) -> None:
+    with pytest.raises(MotionloomError, match=r"share from 0 to 1|without noise"):
+        double_take_features(tiny.prior(), ["walk", "jump"], [80, 80], steps=2, **change)
 
 
 def test_the_ablation_row_between_the_modes_is_a_preset_too() -> None:

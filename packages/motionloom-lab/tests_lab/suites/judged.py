@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from motionloom.features.representation import HUMANML3D
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.suites.items import Item
 
@@ -39,6 +40,8 @@ def number_in(text: str) -> int:
 
 class Judge:
     """Knows everybody; ``blind`` sees one and the same thing everywhere."""
+
+    representation = HUMANML3D
 
     def __init__(self, *, blind: bool = False, name: str = "judge") -> None:
         self.blind, self.name, self.about = blind, name, {"made": "for tests"}

@@ -10,6 +10,7 @@ import pytest
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, mask
+from motionloom.features.representation import HUMANML3D
 from motionloom.kinematics import physics
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.skeleton import SMPL22
@@ -39,7 +40,7 @@ SMALL = control.settings(count=4, replications=2)
 class Judge:
     """Sees how fast somebody is and what number a caption says."""
 
-    name, about = "judge", dict[str, str]()
+    name, about, representation = "judge", dict[str, str](), HUMANML3D
 
     def motions(self, features: Sequence[np.ndarray]) -> np.ndarray:
         return np.stack([[f[:, 2].mean(), f[:, 3].mean(), f[:, 0].std()] for f in features])

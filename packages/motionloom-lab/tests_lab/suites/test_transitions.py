@@ -13,10 +13,11 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
 from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.transitions import JERK_HUMANML3D
+from motionloom_lab.papers.double_take import rows_of
 from motionloom_lab.report import report
 from motionloom_lab.suites import long_baselines, real_seams, text_reference, transitions
 from motionloom_lab.suites.harness import Parts, Run
-from motionloom_lab.suites.long_baselines import DEFAULT, Long, methods, rows_of, titled
+from motionloom_lab.suites.long_baselines import DEFAULT, Long, methods, titled
 from motionloom_lab.suites.protocol import Selection, Transitions, quick_transitions
 from motionloom_lab.suites.registry import chosen
 from tests.recorded import tiny
@@ -51,7 +52,8 @@ def trial(how: Transitions = HOW, *, people: int = 40, crops: bool = True) -> tr
     items = [item(k, 64 + 4 * (k % 30)) for k in range(people)]
     real = text_reference.measure(items, judge, Selection())
     cut = real_seams.SeamCrops.of([one.features for one in items], how.window, judge) if crops else None
-    return transitions.prepare(judge, real, how, cut, real_seams.load_shipped())
+    short = real_seams.SeamCrops.of([one.features for one in items], how.handshake, judge) if crops else None
+    return transitions.prepare(judge, real, how, cut, real_seams.load_shipped(), handshakes=short)
 
 
 def test_cuts_and_windows_are_the_papers_own() -> None:
@@ -246,7 +248,10 @@ def test_too_little_real_motion_is_refused(how: Transitions, said: str) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"steps": 0}, {"replications": 0}, {"guidance": float("inf")}, {"seed": -1}, {"margin": 1000}, {"intervals": 0}],
+    [
+        *({"steps": 0}, {"replications": 0}, {"guidance": float("inf")}, {"seed": -1}, {"margin": 1000}),
+        *({"intervals": 0}, {"rows": "table9"}, {"mode": "mine"}, {"ramp": -1}),
+    ],
 )
 def test_settings_that_cannot_be_are_refused(change: dict) -> None:
     with pytest.raises(MotionloomError):
@@ -270,6 +275,44 @@ def test_ways_give_the_visible_frames(name: str) -> None:
     assert motion.positions.shape == (195, 22, 3)
     assert np.isfinite(motion.positions).all()
     assert np.array_equal(motion.positions, method(prompts, frames, 5).positions)
+
+
+PAPER = [row.split() for row in ("20 10 .1", "20 10 .1", "20 10 .1", "20 0 .1", "20 20 .1", "30 10 .1", "40 10 .1")]
+PAPER += [["20", "10", "0"], ["20", "10", ".2"]]
+"""h, b and M_soft of the nine rows of DoubleTake in the paper's Table 2, the second without its second take and the
+third without joining in its first."""
+
+
+@pytest.mark.parametrize(("mode", "hard", "restart"), [("paper", None, None), ("published", 0.7, 0.5)])
+def test_table_2_has_the_papers_nine_rows(monkeypatch: pytest.MonkeyPatch, mode: str, hard, restart) -> None:
+    """All with the settings that the paper names, the same visible frames, and what the command was given besides."""
+    calls: list[dict] = []
+    real = long_baselines.double_take_features
+
+    def watched(prior, prompts, frames, **named):
+        calls.append({"frames": frames, **named})
+        return real(prior, prompts, frames, **named)
+
+    monkeypatch.setattr(long_baselines, "double_take_features", watched)
+    how = replace(HOW, steps=2, rows="table2", mode=mode, hard=hard, restart=restart)
+    ways = methods(tiny.prior(), how)
+    frames = [how.shortest, how.longest, how.shortest]
+    for method in ways.values():
+        assert len(method(["a person walks", "a person jumps", "a person waves"], frames, 5).features) == sum(frames)
+    usual = 0.1 if mode == "paper" else 0.0
+    for (h, b, soft), call in zip(PAPER, calls, strict=True):
+        assert (call["handshake"], call["ramp"], call["mode"]) == (int(h), int(b), mode)
+        assert call.get("soft", float(soft) if soft == ".1" else usual) == float(soft)
+        assert (call.get("hard"), call.get("restart")) == (hard, restart)
+    only = [(call.get("first_take_only", False), call.get("second_take_only", False)) for call in calls]
+    assert only == [(False, False), (True, False), (False, True), *[(False, False)] * 6]
+    published = {row.name for row in transitions.measure(trial(), {"x": Maker()}).rows if row.measured_on}
+    assert set(ways) <= published
+
+
+def test_rows_of_a_table_and_named_ways_go_together() -> None:
+    names = list(methods(tiny.prior(), replace(HOW, rows="table2"), ["slerp"]))
+    assert (len(names), names[-1]) == (10, "slerp")
 
 
 def test_concatenation_is_decoded_once() -> None:

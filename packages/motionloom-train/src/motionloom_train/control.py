@@ -20,6 +20,7 @@ from torch import Tensor, nn
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT, WIDTH, mask
+from motionloom.features.representation import HUMANML3D
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.skeleton import SMPL22
 from motionloom.weights.adapter import Adapter, fingerprint
@@ -208,7 +209,7 @@ def train_control(run: Training, data: Path | str, text: TextEncoder) -> Path:
     check_control(recipe.control)
     prior = Prior.load(recipe.start or "default")
     motions = restandardised(
-        load_set(data, sources=recipe.sources, seed=recipe.seed), tensor(prior.mean), tensor(prior.std)
+        load_set(data, sources=recipe.sources, seed=recipe.seed, only=HUMANML3D), tensor(prior.mean), tensor(prior.std)
     )
     torch.manual_seed(recipe.seed)
     net = _trained(recipe, prior, world.device)

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from motionloom.diffusion import Schedule
 from motionloom.features.humanml import displacements
 from motionloom.features.layout import FEET, LAYOUT
+from motionloom.features.representation import HUMANML3D, Representation
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom_train.data.batches import Batch, Batches
 from motionloom_train.data.progress import Say
@@ -69,8 +70,8 @@ class WordBank:
         self.most = int(np.diff(starts).max())
         self.tokens, self.pooled = tensor(np.concatenate(tokens), device), tensor(np.concatenate(pooled), device)
 
-    def condition(self, texts: Tensor, lengths: Tensor) -> Condition:
-        """The condition of a batch: numbers of sentences (rows,) and valid frames (rows,)."""
+    def condition(self, texts: Tensor, lengths: Tensor, flags: Tensor | None = None) -> Condition:
+        """The condition of a batch: numbers of sentences and valid frames (rows,), perhaps flags (rows, frames)."""
         device = self.tokens.device
         texts, lengths = texts.to(device), lengths.to(device)
         first, counts = self.starts[texts], self.starts[texts + 1] - self.starts[texts]
@@ -80,7 +81,7 @@ class WordBank:
         words = place < counts[:, None]
         indices = (first[:, None] + place).clamp(max=len(self.tokens) - 1)
         tokens = self.tokens[indices].float() * words[..., None]
-        return condition(self.pooled[texts], tokens=tokens, words=words, lengths=lengths)
+        return condition(self.pooled[texts], tokens=tokens, words=words, lengths=lengths, flags=flags)
 
 
 class Sample(NamedTuple):
@@ -123,7 +124,8 @@ class CleanError:
         self.teacher = teacher
         self.recipe, self.device = recipe or Recipe(), device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
-        self.scale = feature_scale(self.recipe.heights).to(device)
+        self.representation = batches.data.representation
+        self.scale = feature_scale(self.recipe.heights, self.representation).to(device)
         self._signal, self._spread = (tensor(table, device).float() for table in (schedule.signal, schedule.noise))
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
@@ -172,7 +174,8 @@ class CleanError:
         level = self.random_levels(rows, generator)
         noise = torch.randn(batch.features.shape, generator=generator, device=self.device)
         keep = torch.rand(rows, generator=generator, device=self.device) >= self.recipe.drop_text
-        return Sample(batch.features, level, noise, self.words.condition(batch.texts, batch.lengths).choose(keep))
+        cond = self.words.condition(batch.texts, batch.lengths, batch.flags)
+        return Sample(batch.features, level, noise, cond.choose(keep))
 
     def random_levels(self, rows: int, generator: torch.Generator) -> Tensor:
         """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
@@ -189,16 +192,20 @@ class CleanError:
         if self.recipe.displacement:
             moved = displacement_error(denoised, sample.clean, sample.cond.lengths, self.mean, self.std)
             error = error + self.recipe.displacement * moved
+        if self.recipe.geometric:
+            bodily = geometric_error(
+                denoised, sample.clean, sample.cond.lengths, self.mean, self.std, kind=self.representation
+            )
+            error = error + self.recipe.geometric * bodily
         return error
 
 
-def feature_scale(heights: float = 1.0) -> Tensor:
-    """(263,) how much each feature's error counts, 1 on average; ``heights``: how much more that of a height does."""
-    scale = torch.ones(max(block.stop for block in LAYOUT.values()))
-    for name, block in LAYOUT.items():
+def feature_scale(heights: float = 1.0, kind: Representation = HUMANML3D) -> Tensor:
+    """(numbers,) how much each one's error counts, 1 on average; ``heights``: how much more that of a height does."""
+    scale = torch.ones(kind.width)
+    for name, block in kind.blocks.items() if kind is HUMANML3D else ():  # others are weighed as published
         scale[block] = WEIGHTS[name]
-    scale[LAYOUT["root_height"]] *= heights
-    scale[LAYOUT["ric"]][1::3] *= heights
+    scale[list(kind.heights)] *= heights
     return scale / scale.mean()
 
 
@@ -218,6 +225,33 @@ def masked_error(denoised: Tensor, clean: Tensor, lengths: Tensor, scale: Tensor
     valid = torch.arange(clean.shape[1], device=clean.device) < lengths[:, None]
     error = ((denoised.float() - clean) ** 2 * scale).mean(-1)
     return ((error * valid).sum(1) / lengths.clamp(min=1)).mean()
+
+
+STANDING = 0.01
+"""Metres per frame: a foot that moves no more stands, in `geometric_error`."""
+
+
+def geometric_error(
+    denoised: Tensor, clean: Tensor, lengths: Tensor, mean: Tensor, std: Tensor, *, kind: Representation
+) -> Tensor:
+    """MDM's geometric losses, each of weight 1 (Tevet et al. 2023, eq. 3 to 5), for any `Representation`.
+
+    Squared errors, meaned over valid frames and numbers of each row, then over rows: of the joints' places in the world
+    (metres), of the frame-to-frame differences of the standardised numbers but for the root's three, and of the steps
+    (metres) of feet that stand in the data. (rows, frames, numbers) standardised twice, (rows,), (numbers,) twice, to
+    one number.
+    """
+    denoised = denoised.float()
+    places, real = (kind.decode_positions(x * std + mean) for x in (denoised, clean))
+    root = max(kind.blocks["root_height"].stop, kind.blocks["root_velocity"].stop)
+    changes = (denoised.diff(dim=1) - clean.diff(dim=1))[..., root:]
+    feet = list(FEET)
+    steps, stands = places[:, :, feet].diff(dim=1), real[:, :, feet].diff(dim=1).norm(dim=-1) <= STANDING
+    one = torch.ones((), device=clean.device)
+    error = masked_error(places.flatten(-2), real.flatten(-2), lengths, one)
+    error = error + masked_error(changes, torch.zeros_like(changes), lengths - 1, one)
+    slides = (steps * stands[..., None]).flatten(-2)
+    return error + masked_error(slides, torch.zeros_like(slides), lengths - 1, one)
 
 
 PLANTED = 4.0

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.features.representation import BABEL, HUMANML3D
 from motionloom.runtime.text.known import Known, known_sentences
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.weights.container import read_tensors
@@ -50,7 +50,7 @@ def known_table(motions: MotionSet, encoder: TextEncoder) -> Known:
         name = item.group.removeprefix(PREFIX).removeprefix(MEASURED)
         frames.setdefault(name, []).append((item.start, item.start + item.frames))
         texts.setdefault(name, {}).update(dict.fromkeys(item.texts))
-    seconds = {group: _covered(spans) / FPS for group, spans in frames.items()}
+    seconds = {group: _covered(spans) / motions.representation.fps for group, spans in frames.items()}
     groups = sorted(seconds, key=lambda group: (group in CAPTION_GROUPS, -seconds[group], group))
     numbers = dict.fromkeys(number for group in groups for number in texts[group])
     return known_sentences(
@@ -75,7 +75,7 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
     recipe, world = run.recipe, run.world
     motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
     torch.manual_seed(recipe.seed)
-    net = PriorNet(NetConfig.parse(recipe.net))
+    net = PriorNet(net_config(recipe, motions))
     teacher: nn.Module | None = None
     if recipe.start:
         start = load_start(recipe, net.config)
@@ -118,6 +118,24 @@ def train_prior(run: Training, data: Path | str, text: TextEncoder) -> Path:
     return run.run(objective, export, about, wrap=wrap, capture=capture)
 
 
+def net_config(recipe: Recipe, motions: MotionSet) -> NetConfig:
+    """The recipe's network, with as many numbers per frame as the set has where it does not say how many.
+
+    Raises MotionloomError for a network, or for losses, that the set has not the numbers for.
+    """
+    kind = motions.representation
+    config = NetConfig.parse({"features": kind.width, **recipe.net})
+    if config.features != kind.width:
+        raise MotionloomError(f"the recipe's network has net.features = {config.features}; this set has {kind}")
+    if config.flags and motions.flags is None:
+        raise MotionloomError("the recipe's net.flags reads where actions change, which this set does not say")
+    if recipe.displacement and kind is not HUMANML3D:
+        raise MotionloomError(f"the recipe's displacement is a loss of HumanML3D's numbers; this set has {kind}")
+    if recipe.geometric and kind is not BABEL:
+        raise MotionloomError(f"the recipe's geometric losses are of BABEL's numbers; this set has {kind}")
+    return config
+
+
 def load_start(recipe: Recipe, config: NetConfig) -> Prior:
     """The weights that a recipe goes on from; raises MotionloomError if they are not those it names, or of another
     network than ``config``."""
@@ -152,14 +170,15 @@ def text_encoder(weights: str) -> TextEncoder:
 
 
 def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text: TextEncoder) -> Prior:
-    net = PriorNet(NetConfig.parse(recipe.net))
+    net = PriorNet(net_config(recipe, motions))
     net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
     notes: dict[str, Any] = {"steps": step, "recipe": recipe.name, "seed": recipe.seed}
     begun = {"start": recipe.start, "start_sha256": recipe.start_sha256}
     notes |= {"minutes": round(motions.minutes, 1)} | {key: value for key, value in begun.items() if value}
     card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
-    return Prior(prior_session(net), schedule, motions.mean.numpy(), motions.std.numpy(), text, card)
+    mean, std = motions.mean.numpy(), motions.std.numpy()
+    return Prior(prior_session(net), schedule, mean, std, text, card, motions.representation.fps)
 
 
 def _show(prior: Prior, recipe: Recipe, path: Path) -> None:

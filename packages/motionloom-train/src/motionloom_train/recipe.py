@@ -58,6 +58,8 @@ class Recipe:
     """Compile the network with torch.compile, on a CPU; launch whole steps of a prior as graphs, on a GPU."""
     displacement: float = 0.0
     """Weight of `objectives.displacement_error` in the loss; 0: the published loss alone."""
+    geometric: float = 0.0
+    """Weight of MDM's geometric losses, `objectives.geometric_error`, for sets of BABEL's numbers; 0: without."""
     early: float = 0.0
     """Share of the samples whose noise level is drawn as the sampler's spacing ``early`` goes; the rest evenly."""
     heights: float = 1.0
@@ -147,6 +149,7 @@ LIMITS: Mapping[str, float] = {
     "rate": 10.0,
     "decay": 10.0,
     "displacement": 1000.0,
+    "geometric": 1000.0,
     "keep": 1000.0,
     "rank": 512,
     "given_rank": 512,

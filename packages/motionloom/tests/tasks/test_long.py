@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,13 +16,16 @@ from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
+from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.long import Past, compose, compose_takes, long_features
 from motionloom.tasks.splice import move_rigidly
 from motionloom.tasks.text import sample_features
+from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 from tests.tasks.test_edit import person
+from tests.tasks.test_text import babel_prior
 
 WALK, TURN = "a person walks", "a person turns left"
 
@@ -275,3 +279,34 @@ def test_weights_for_other_numbers_are_refused(prior: Prior) -> None:
         compose(
             replace(prior, mean=np.zeros((135,), np.float32), std=np.ones((135,), np.float32)), [Segment(WALK, 1.0)]
         )
+
+
+@pytest.mark.parametrize("flags", [False, True], ids=["plain", "transitions"])
+def test_weights_of_babels_numbers_make_long_motions_at_their_own_rate(tmp_path: Path, flags: bool) -> None:
+    """30 frames a second, from over the origin and facing +Z; take i is that of its own seed."""
+    babel = babel_prior(tmp_path, flags=flags)
+    segments = [Segment("walk", 1.0, transition=0.4), Segment("turn left", 2.0)]
+    first, second = compose_unplaced(babel, segments, steps=3, count=2, foot_lock=False)
+    assert [(len(one), one.fps) for one in (first, second)] == [(90, 30.0), (90, 30.0)]
+    np.testing.assert_allclose(heading(first.positions())[0], 0, atol=1e-5)
+    (alone,) = compose_unplaced(babel, segments, steps=3, seed=1, foot_lock=False)
+    np.testing.assert_allclose(second.positions(), alone.positions(), atol=1e-3)
+
+
+def test_a_network_with_flags_sees_what_neighbours_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Transitions of 12 and 18 frames: half of either on each side of a seam, whole in both rows."""
+    babel, seen = babel_prior(tmp_path, flags=True), []
+    bind = PriorSession.bind
+    monkeypatch.setattr(PriorSession, "bind", lambda net, cond: seen.append(cond) or bind(net, cond))
+    segments = [Segment("walk", 1.0, transition=0.4), Segment("jump", 1.0, transition=0.6), Segment("walk", 1.0)]
+    list(long_features(babel, segments, steps=2))
+    rows = [cond.flags[0].tolist() for cond in seen[::2]]
+    assert rows == [[0] * 24 + [1] * 12, [1] * 12 + [0] * 15 + [1] * 18, [1] * 18 + [0] * 21]
+
+
+def test_babels_numbers_know_no_places(tmp_path: Path) -> None:
+    babel, goal = babel_prior(tmp_path, flags=False), on_ground(np.zeros((20, 2)))
+    with pytest.raises(MotionloomError, match="goals need 263"):
+        list(compose_unplaced(babel, [Segment("walk", 1.0, goal=goal)], steps=2))
+    with pytest.raises(MotionloomError, match="long motion needs 263"):
+        list(compose(babel, [Segment("walk", 1.0)], steps=2))

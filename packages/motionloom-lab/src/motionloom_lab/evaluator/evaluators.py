@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.features.representation import Representation
 from motionloom.kinematics.physics import Array
 
 
@@ -37,8 +38,13 @@ class Evaluator(Protocol):
         """Where it comes from and what one may do with it."""
         ...
 
+    @property
+    def representation(self) -> Representation:
+        """What the numbers are that it reads."""
+        ...
+
     def motions(self, features: Sequence[np.ndarray]) -> Array:
-        """Motions, each (frames, 263) unstandardised at 20 frames per second, as (motions, width) float64."""
+        """Motions, each (frames, numbers) of its representation, unstandardised, as (motions, width) float64."""
         ...
 
     def texts(self, captions: Sequence[Caption]) -> Array:

@@ -18,7 +18,8 @@ from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.features.layout import LAYOUT
+from motionloom.features.representation import HUMANML3D, Representation, named
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.weights.container import Container, check, halved
@@ -30,7 +31,7 @@ EVALUATORS = Container("evaluator", "motionloom_evaluator", max_bytes=100 << 20)
 KEY = EVALUATORS.key
 """Metadata entry with the file's kind."""
 INPUTS = 4 + 63 + 66 + 4
-"""Numbers per frame that the motion encoder reads, see `inputs`."""
+"""Numbers per frame that the motion encoder reads of HumanML3D's, see `inputs`."""
 STRIDE = 4
 """Frames to a token: 20 per second become 5."""
 FARTHEST = 20.0
@@ -55,8 +56,17 @@ class EvaluatorConfig:
     embed: int = 128
     """Width of the common space."""
     dropout: float = 0.1
+    representation: str = HUMANML3D.name
+    """What the numbers are that are judged."""
+
+    @property
+    def inputs(self) -> int:
+        """Numbers per frame that the motion encoder reads."""
+        kind = named(self.representation)
+        return INPUTS if kind is HUMANML3D else kind.width
 
     def __post_init__(self) -> None:
+        named(self.representation)
         sizes = (self.width, self.layers, self.heads, self.hidden, self.text, self.embed)
         good = all(isinstance(n, int) and not isinstance(n, bool) and 1 <= n <= 4096 for n in sizes)
         if not good or self.layers > 64 or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
@@ -64,13 +74,16 @@ class EvaluatorConfig:
 
 
 def inputs(features: Tensor, lengths: Tensor) -> Tensor:
-    """What a viewer sees, (rows, frames, 263) unstandardised and (rows,) to (rows, frames, INPUTS).
+    """What a viewer sees, (rows, frames, numbers) unstandardised and (rows,) to (rows, frames, inputs).
 
-    The root's four numbers and the places of the joints as stored (67), how far each joint goes to the next frame
+    Of other representations than HumanML3D's the numbers themselves, as published for BABEL. Of HumanML3D's the
+    root's four numbers and the places of the joints as stored (67), how far each joint goes to the next frame
     (66), and the way walked since frame 0: cosine and sine of the heading, x and z in metres. All of it follows from
     the first 67 features, those that `decode_positions` reads: rotations, velocities and contact flags of a generated
     motion may contradict its positions, and nobody sees them.
     """
+    if features.shape[-1] != HUMANML3D.width:
+        return features
     moved = humanml.displacements(features).flatten(-2)
     frames = torch.arange(features.shape[1], device=features.device)
     known = torch.minimum(frames, (lengths[:, None] - 2).clamp(min=0))  # the last frame has no next one: repeat
@@ -125,14 +138,14 @@ class MotionEncoder(nn.Module):
 
     def __init__(self, config: EvaluatorConfig) -> None:
         super().__init__()
-        self.first = nn.Conv1d(INPUTS, config.width, 4, stride=2, padding=1)
+        self.first = nn.Conv1d(config.inputs, config.width, 4, stride=2, padding=1)
         self.second = nn.Conv1d(config.width, config.width, 4, stride=2, padding=1)
         self.blocks = nn.ModuleList(Block(config) for _ in range(config.layers))
         self.drop = nn.Dropout(config.dropout)
         self.pool = Pool(config)
 
     def forward(self, x: Tensor, lengths: Tensor) -> Tensor:
-        """(rows, frames, INPUTS), zeros behind each row's length of at least `STRIDE` frames, to (rows, embed)."""
+        """(rows, frames, inputs), zeros behind each row's length of at least `STRIDE` frames, to (rows, embed)."""
         x = F.gelu(self.first(self.drop(x).transpose(1, 2)))
         x = x * _valid(lengths // 2, x.shape[-1])[:, None]  # a row ends as it would alone
         x = F.gelu(self.second(x)).transpose(1, 2)
@@ -201,7 +214,7 @@ class Embedder:
 
     net: EvaluatorNet
     mean: Tensor
-    """(INPUTS,) of the training data."""
+    """(inputs,) of the training data."""
     std: Tensor
     text: TextEncoder
     card: dict[str, str]
@@ -217,24 +230,29 @@ class Embedder:
         """See `Evaluator`."""
         return dict(self.card)
 
+    @property
+    def representation(self) -> Representation:
+        """See `Evaluator`."""
+        return named(self.net.config.representation)
+
     @torch.no_grad()
     def motions(self, features: Sequence[np.ndarray]) -> np.ndarray:
-        """Motions (frames, 263) unstandardised at 20 fps to unit vectors (motions, embed) float64.
+        """Motions (frames, numbers) unstandardised to unit vectors (motions, embed) float64.
 
         Each row is independent of the others. Raises MotionloomError for other shapes, fewer than 4 frames, NaN.
         """
-        points = np.zeros((len(features), self.net.config.embed))
+        points, width = np.zeros((len(features), self.net.config.embed)), self.representation.width
         for number, one in enumerate(features):
-            if one.ndim != 2 or one.shape[1] != WIDTH or len(one) < STRIDE or not np.isfinite(one).all():
+            if one.ndim != 2 or one.shape[1] != width or len(one) < STRIDE or not np.isfinite(one).all():
                 raise MotionloomError(
-                    f"motion {number} cannot be judged: it must be ({STRIDE} or more frames, {WIDTH}) finite numbers; "
+                    f"motion {number} cannot be judged: it must be ({STRIDE} or more frames, {width}) finite numbers; "
                     f"got shape {one.shape}"
                 )
         order = sorted(range(len(features)), key=lambda i: len(features[i]))
         for first in range(0, len(order), ROWS):
             rows = order[first : first + ROWS]
             lengths = torch.tensor([len(features[i]) for i in rows])
-            batch = torch.zeros(len(rows), int(lengths.max()), WIDTH, dtype=torch.float64)
+            batch = torch.zeros(len(rows), int(lengths.max()), width, dtype=torch.float64)
             for row, i in enumerate(rows):
                 batch[row, : lengths[row]] = torch.from_numpy(np.asarray(features[i], dtype=np.float64))
             x = standardised(inputs(batch, lengths), lengths, self.mean.double(), self.std.double())
@@ -290,7 +308,8 @@ def load_embedder(path: Path | str, text: TextEncoder) -> Embedder:
         net = EvaluatorNet(about["net"])
     weights = {k[4:]: tensor(v).float() for k, v in tensors.items() if k.startswith("net.")}
     own = {f"net.{k}": shape for k, shape in shapes(net).items()}
-    check(tensors, own | {"mean": (INPUTS,), "std": (INPUTS,)}, str(path))
+    read = (about["net"].inputs,)
+    check(tensors, own | {"mean": read, "std": read}, str(path))
     if float(tensors["std"].min()) <= 0:
         raise MotionloomError(f"{path} has a spread of 0; fetch the evaluator again")
     net.load_state_dict(weights, assign=True)
@@ -303,6 +322,7 @@ def _read(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
     about, tensors = EVALUATORS.read(path)
     with EVALUATORS.parsing(path):
         names = {field.name for field in fields(EvaluatorConfig)}
+        about["net"] = {"representation": HUMANML3D.name, **about["net"]}  # older files do not say
         if set(about["net"]) != names or not isinstance(about["text"], str):
             raise ValueError("sizes of another kind")
         about["net"] = EvaluatorConfig(**about["net"])

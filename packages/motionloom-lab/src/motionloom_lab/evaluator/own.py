@@ -16,6 +16,7 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.features.representation import HUMANML3D
 from motionloom.io.atomic import finished
 from motionloom.kinematics.physics import Array
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
@@ -259,6 +260,11 @@ def validate(
     Raises MotionloomError where the set holds too few captioned held-out motions (32 are needed).
     """
     clips = read_clips(data, sources=sources, splits=SPLITS)
+    if evaluator.representation is not HUMANML3D or clips[0].representation is not HUMANML3D:
+        raise MotionloomError(
+            f"what is planted here are faults of {HUMANML3D}; {evaluator.name} reads {evaluator.representation} and "
+            f"{data} holds {clips[0].representation}"
+        )
     held = held_out(clips)
     if len(held.captioned) < BATCH or len(held.windows) < BATCH:
         raise MotionloomError(

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from motionloom.features import humanml
-from motionloom.features.layout import WIDTH
+from motionloom.features.representation import HUMANML3D
 from motionloom_train.data.sets import Item, MotionSet, load_set, read_clips
 from motionloom_train.data.words import STATES, mirror_text
 
@@ -83,7 +83,7 @@ class PairBatch:
     """Motions, their sentences, and a contrary of some of both."""
 
     features: Tensor
-    """(rows + hard, frames, 263) unstandardised, zeros behind each length; the last ones are contrary motions."""
+    """(rows + hard, frames, numbers) unstandardised, zeros behind each length; the last ones are contrary motions."""
     lengths: Tensor
     texts: Tensor
     """(rows + hard texts,) numbers of sentences; the last ones are contrary sentences."""
@@ -160,7 +160,7 @@ class Pairs:
         motions, motion_rows = self._hard_motions(windows, texts, rng)
         text_rows = [row for row, text in enumerate(texts) if self.contrary[text] != text][: round(self.hard * rows)]
         lengths = torch.tensor([len(m) for m in (*windows, *motions)])
-        features = torch.zeros(len(lengths), int(lengths.max()), WIDTH)
+        features = torch.zeros(len(lengths), int(lengths.max()), self.data.features.shape[1])
         for row, motion in enumerate((*windows, *motions)):
             features[row, : len(motion)] = torch.from_numpy(motion)
         alone = ("human", "index")  # captions: each its own group
@@ -178,9 +178,14 @@ class Pairs:
     def _hard_motions(
         self, windows: Sequence[np.ndarray], texts: Sequence[int], rng: np.random.Generator
     ) -> tuple[list[np.ndarray], list[int]]:
-        """Mirror images where a sentence names a side, films run backwards where it names what shows that."""
+        """Mirror images where a sentence names a side, films run backwards where it names what shows that.
+
+        Both are of HumanML3D's numbers; motions of others have no contrary.
+        """
         motions: list[np.ndarray] = []
         rows: list[int] = []
+        if self.data.representation is not HUMANML3D:
+            return motions, rows
         for row, (motion, number) in enumerate(zip(windows, texts, strict=True)):
             if len(rows) >= round(self.hard * len(windows)):
                 break

@@ -1,5 +1,6 @@
 """Training the own evaluator: the contrastive objective, and the file that comes out."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.features.layout import LAYOUT
+from motionloom.features.representation import HUMANML3D
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom_lab.evaluator.net import (
-    INPUTS,
     Embedder,
     EvaluatorConfig,
     EvaluatorNet,
@@ -29,7 +30,7 @@ from motionloom_train.tensors import number_of
 SHARPEST = 4.6
 """Logarithm: the temperature does not go below 0.01."""
 BLOCKS = (slice(0, 1), slice(1, 3), slice(3, 4), LAYOUT["ric"], slice(67, 133), slice(133, 135), slice(135, 137))
-"""Of the inputs: each block has one spread, as in the published statistics."""
+"""Of the inputs of HumanML3D's numbers: each block has one spread, as in the published statistics."""
 FORGET = 0.1
 """Share of word pieces that a training step does not see."""
 
@@ -83,7 +84,7 @@ def contrast(ask: Tensor, answer: Tensor, hard: Tensor, owner: Tensor, allowed: 
 
 
 def input_statistics(pairs: Pairs, *, seed: int) -> tuple[Tensor, Tensor]:
-    """Mean (INPUTS,) and spread, one per block, of what the network reads of at most 1500 windows of the set."""
+    """Mean (inputs,) and spread, one per block of HumanML3D's, of what is read of at most 1500 windows of the set."""
     rng = np.random.default_rng(seed)
     parts = []
     for number in rng.integers(len(pairs.data.items), size=min(1500, 20 * len(pairs.data.items))):
@@ -91,26 +92,24 @@ def input_statistics(pairs: Pairs, *, seed: int) -> tuple[Tensor, Tensor]:
         parts.append(inputs(window, torch.tensor([window.shape[1]]))[0])
     frames = torch.cat(parts)
     mean, std = frames.mean(0), frames.std(0)
-    for block in BLOCKS:
-        std[block] = std[block].mean().clamp(min=1e-4)
-    return mean.float(), std.float()
+    for block in BLOCKS if pairs.data.representation is HUMANML3D else ():
+        std[block] = std[block].mean()
+    return mean.float(), std.clamp(min=1e-4).float()
 
 
 def train_evaluator(run: Training, data: Path | str, text: TextEncoder) -> Path:
     """Train (or go on training) an evaluator on a built set; returns its file."""
     recipe, device = run.recipe, run.world.device
     text_digest(text)
-    config = config_of(recipe, text)
     pairs = Pairs.load(data, sources=recipe.sources, seed=recipe.seed)
-    if pairs.data.features.shape[1] != WIDTH:
-        raise MotionloomError(f"{data} has {pairs.data.features.shape[1]} numbers per frame; {WIDTH} are needed")
+    config = replace(config_of(recipe, text), representation=pairs.data.representation.name)
     torch.manual_seed(recipe.seed)
     net = EvaluatorNet(config)
     mean, std = input_statistics(pairs, seed=recipe.seed)
     words = WordBank(text, pairs.texts, room=64, progress=run.progress)
     objective = Contrast(net, pairs, words, mean, std, device=device)
     about = (
-        f"{sum(p.numel() for p in net.parameters()):,} parameters of {INPUTS} inputs, {len(pairs.data.items):,} "
+        f"{sum(p.numel() for p in net.parameters()):,} parameters of {config.inputs} inputs, {len(pairs.data.items):,} "
         f"described stretches, {len(pairs.texts):,} sentences, {pairs.data.minutes:.0f} minutes recorded"
     )
 

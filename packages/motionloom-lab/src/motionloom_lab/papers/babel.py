@@ -24,8 +24,11 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.features.babel import FPS, Y_UP, encode
 from motionloom.io import npz, text
+from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
+from motionloom_lab.report.files import write_json
+from motionloom_train.data.clips import Clip, Note, write_clip
 from motionloom_train.data.paths import DAMAGED, inside
 from motionloom_train.data.progress import Say
 from motionloom_train.data.words import check_caption
@@ -38,6 +41,8 @@ TOUCH = 1 / FPS
 """Seconds between two labels that still count as adjacent: a frame."""
 BRIEFEST = 0.5
 """Seconds: shorter recordings are dropped."""
+LICENCE = "BABEL / AMASS: non-commercial research under the licences of BABEL, AMASS and its subsets"
+SPLITS = ("train", "val")
 _RELEASE = "babel_v1.0_release"
 _MAX_JSON = 1 << 28
 _MAX_LABELS = 1000
@@ -366,6 +371,45 @@ def load_items(
                 raise
             dropped(str(error))
     return result
+
+
+def build_set(folders: Sequence[Path | str], out: Path | str, *, seed: int = 0, progress: Say = print) -> Path:
+    """The items of BABEL folders as a built set of 135 numbers, which training and measuring read; gives ``set.json``.
+
+    Both splits that a folder has; each item is a clip with its label and its flags, longer ones cut at random by
+    ``seed``. Recordings that cannot be used are dropped with a line. Raises MotionloomError where nothing is left.
+    """
+    out = Path(out)
+    check_place(out / "set.json", folders=True)
+    if any((out / "clips").glob("*.safetensors")):
+        raise MotionloomError(f"{out} holds clips already; build into another folder")
+    (out / "clips").mkdir(parents=True, exist_ok=True)
+    counts: dict[str, int] = dict.fromkeys(SPLITS, 0)
+    dropped = 0
+
+    def drop(reason: str) -> None:
+        nonlocal dropped
+        dropped += 1
+        progress(f"dropped: {reason}")
+
+    for folder in map(Path, folders):
+        files = _label_files(folder)
+        if not files:
+            find_recordings(folder)  # says what is missing
+        for split in files:
+            for item in load_items(folder, split, crop=True, seed=seed, dropped=drop):
+                note = Note(0, len(item), "human", (item.text,))
+                clip = Clip(item.name, "babel", LICENCE, split, "plain", (note,), item.features, flags=item.flags)
+                write_clip(out / "clips", clip)
+                counts[split] += 1
+    if not any(counts.values()):
+        raise MotionloomError(
+            f"no item of {SHORTEST / FPS:g} to {LONGEST / FPS:g} s could be made of {', '.join(map(str, folders))}; "
+            "their labels need pairs of actions, and the recordings must lie there"
+        )
+    write_json(out / "set.json", {"features": "babel", "clips": counts, "licences": [LICENCE], "dropped": dropped})
+    progress(f"{counts['train']} items to train on, {counts['val']} to measure with: {out / 'set.json'}")
+    return out / "set.json"
 
 
 def statistics(items: Sequence[BabelItem]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

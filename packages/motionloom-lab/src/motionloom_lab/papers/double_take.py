@@ -12,7 +12,7 @@ intervals, frames, features). What is above `double_take_features` is plain arra
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Literal, TypedDict, Unpack
 
@@ -345,6 +345,36 @@ class TakeSettings(TypedDict, total=False):
     spacing: str
     first_take_only: bool
     second_take_only: bool
+    soft: float
+    """M_soft, 0 to 1: what the ramp keeps beside the handshake; in the paper's mode the handshake keeps as much."""
+    hard: float
+    """M_hard, 0 to 1: what the ramp keeps at its other end."""
+    restart: float
+    """T', where the second take starts: a share of all levels, above 0."""
+
+
+def adjusted(mode: str, *, soft: float | None = None, hard: float | None = None, restart: float | None = None) -> Mode:
+    """A mode with another M_soft, M_hard or T' (None: the mode's own), see `TakeSettings`.
+
+    Raises MotionloomError for an unknown mode and for shares that are none.
+    """
+    if mode not in MODES:
+        raise MotionloomError(f"DoubleTake has no mode {mode!r}; there are {', '.join(MODES)}")
+    chosen = MODES[mode]
+    for name, share in {"soft": soft, "hard": hard, "restart": restart}.items():
+        if share is not None and not (0 <= share <= 1 and (share or name != "restart")):  # NaN too
+            raise MotionloomError(f"DoubleTake's {name} is a share from 0 to 1, restart above 0; got {share:g}")
+    keep = chosen.keep
+    low = keep.low if soft is None else soft
+    joined = low if keep.handshake == keep.low else keep.handshake
+    keep = replace(keep, low=low, handshake=joined, high=keep.high if hard is None else hard)
+    return replace(chosen, keep=keep, restart=chosen.restart if restart is None else restart)
+
+
+def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
+    """Row lengths of DoubleTake whose unfolded frames and seams are those of the visible ``frames``."""
+    half, rest = handshake // 2, handshake - handshake // 2
+    return [n + half * (i > 0) + rest * (i < len(frames) - 1) for i, n in enumerate(frames)]
 
 
 def double_take_features(
@@ -368,9 +398,10 @@ def double_take_features(
         mode: published code or paper.
         handshake: frames, one number or one per transition.
         ramp: the same; None takes the mode's own (20 published, 10 paper).
+        settings: see `TakeSettings`; of M_soft, M_hard and T' the mode's own where none is named.
 
     Returns:
-        Features (frames, 263), not standardised, and where each interval ends (`Plan.ends`).
+        Features (frames, numbers of the prior), not standardised, and where each interval ends (`Plan.ends`).
 
     Raises:
         MotionloomError: for requests that cannot be met.
@@ -379,14 +410,12 @@ def double_take_features(
     solver, spacing = settings.get("solver", SOLVER), settings.get("spacing", SPACING)
     first_take_only = settings.get("first_take_only", False)
     second_take_only = settings.get("second_take_only", False)
-    if mode not in MODES:
-        raise MotionloomError(f"DoubleTake has no mode {mode!r}; there are {', '.join(MODES)}")
+    chosen = adjusted(mode, soft=settings.get("soft"), hard=settings.get("hard"), restart=settings.get("restart"))
     if steps not in range(1, prior.schedule.steps + 1) or solver not in SOLVERS:
         raise MotionloomError(
             f"{steps} steps of {solver!r} cannot be taken; there are 1 to {prior.schedule.steps} steps and the solvers "
             f"{', '.join(SOLVERS)}"
         )
-    chosen = MODES[mode]
     plan = Plan.of(list(frames), handshake, chosen.ramp if ramp is None else ramp)
     _check(prompts, plan, seed=seed, guidance=guidance, neither=first_take_only and second_take_only)
     count, joins = len(prompts), len(plan.handshakes)

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
+from motionloom.features.representation import Representation, of_width
 from motionloom.kinematics.physics import Array
 from motionloom.weights.container import Container
 from motionloom_lab.evaluator.evaluators import Caption
@@ -84,6 +85,13 @@ class GuoEvaluator:
             "caption length": lengths[self.cap_len],
             "frames": f"cut to a multiple of {UNIT}; zeros after the end of clips shorter than {WINDOW}",
         }
+
+    @property
+    def representation(self) -> Representation:
+        """See `Evaluator`; raises MotionloomError for numbers that nothing here makes, such as KIT's."""
+        if self.mean is None:
+            raise MotionloomError("this evaluator has no statistics; import it again with --mean and --std")
+        return of_width(len(self.mean))
 
     def with_caption_length(self, cap_len: CapLen) -> "GuoEvaluator":
         """The same evaluator with the other behaviour; report both."""

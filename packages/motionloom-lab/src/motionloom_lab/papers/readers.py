@@ -9,8 +9,6 @@ from motionloom_train.data.pairs import Pair
 from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.sources import Places, Span, Take, places_of
 
-BABEL_LICENCE = "BABEL / AMASS: non-commercial research under the licences of BABEL, AMASS and its subsets"
-
 
 def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> list[Take]:
     """As `data.sources.find_takes`, and the takes of a BABEL folder."""
@@ -35,7 +33,7 @@ def _babel(folder: Path) -> Iterator[Take]:
         spans = [Span(0.0, float("inf"), recording.whole, "human")] if recording.whole else []
         spans += [Span(s.start, s.end, (s.text,), "human") for s in recording.segments if not s.is_transition]
         yield Take(
-            recording.name, "babel", BABEL_LICENCE, recording.split, tuple(spans), _babel_reader(folder, recording)
+            recording.name, "babel", babel.LICENCE, recording.split, tuple(spans), _babel_reader(folder, recording)
         )
 
 

@@ -149,8 +149,9 @@ def study(asked: Asked) -> None:
 
 def make_reference(asked: Asked) -> None:
     """The real numbers that runs without --data show, for `text` or `transitions`."""
+    from motionloom.features.representation import HUMANML3D
     from motionloom_lab.suites import measures, protocol, real_seams, text_reference
-    from motionloom_lab.suites.items import fitting, read_items
+    from motionloom_lab.suites.items import built_of, fitting, read_items
 
     place, data, chosen = asked["make_reference"], asked.get("data"), measures.selection(asked)
     if data is None:
@@ -165,6 +166,8 @@ def make_reference(asked: Asked) -> None:
         return print(f"{path}: {len(found.names)} items, {path.stat().st_size / 1e6:.2f} MB")
     files.check_report(place)
     how, chosen = measures.with_asked(protocol.Transitions(), asked), fitting(data, chosen)
+    if built_of(data) not in (None, HUMANML3D):
+        raise MotionloomError(f"the numbers that ship are of {HUMANML3D}; name data of these")
     motions = [item.features for item in read_items(data, chosen)]
     crops = real_seams.SeamCrops.of(motions, how.window, None, seed=how.seed)
     source = f"{' + '.join(chosen.splits)} of {', '.join(chosen.sources) or 'all sources'}"

@@ -16,7 +16,8 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.layout import FPS
+from motionloom.features.representation import HUMANML3D, Representation
 from motionloom.io.text import plain_json
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
@@ -141,13 +142,19 @@ class Run:
         """The weights in a row's name."""
         return Path(self.weights).stem
 
-    def prior(self, steps: int) -> Prior:
-        """The weights; MotionloomError where they do not draw what the evaluators read, or not in so many steps."""
-        return readable(Prior.load(self.weights, device=self.device), steps)
+    def prior(self, steps: int, kind: Representation = HUMANML3D) -> Prior:
+        """The weights; MotionloomError where they do not draw what the evaluator reads, or not in so many steps."""
+        return readable(Prior.load(self.weights, device=self.device), steps, kind)
 
-    def judge(self) -> Evaluator:
-        """The evaluator; MotionloomError for a file that is none."""
-        return evaluators.load_evaluator(self.evaluator)
+    def judge(self, kind: Representation | None = HUMANML3D) -> Evaluator:
+        """The evaluator; MotionloomError for a file that is none, and for one of another representation than ``kind``
+        (None: any)."""
+        judge = evaluators.load_evaluator(self.evaluator)
+        if kind is not None and judge.representation is not kind:
+            raise MotionloomError(
+                f"{judge.name} reads {judge.representation}, and {kind} are judged here; name another"
+            )
+        return judge
 
     def settings(self, judge: Evaluator) -> dict[str, Any]:
         """What the weights, the evaluator and the device change, for `parts`."""
@@ -179,12 +186,12 @@ class Run:
         return Report(suite, title, self.command, protocol, shown, (*rows, *others), tuple(notes))
 
 
-def readable(prior: Prior, steps: int) -> Prior:
-    """The prior; MotionloomError unless it draws HumanML3D features at 20 frames per second, in so many steps."""
-    if len(prior.mean) != WIDTH or prior.fps != FPS:
+def readable(prior: Prior, steps: int, kind: Representation = HUMANML3D) -> Prior:
+    """The prior; MotionloomError unless it draws the representation that is judged, in so many steps."""
+    if len(prior.mean) != kind.width or prior.fps != kind.fps:
         raise MotionloomError(
-            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second; the evaluators read "
-            f"{WIDTH} at {FPS:g}"
+            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second; the evaluator reads "
+            f"{kind}: name one of theirs with --evaluator"
         )
     check_steps(steps, prior.schedule.steps)
     return prior
@@ -219,7 +226,7 @@ def evaluator_file(evaluator: str) -> Path | None:
 
 
 def embedded(evaluator: Evaluator, motions: Sequence[np.ndarray]) -> Array:
-    """(motions, width) of motions (frames, 263) each."""
+    """(motions, width) of motions (frames, numbers) each."""
     return np.concatenate([evaluator.motions(motions[k : k + CHUNK]) for k in range(0, len(motions), CHUNK)])
 
 
@@ -233,18 +240,18 @@ def plain_words(text: str) -> str:
     return " ".join(re.findall(r"\w+", text.lower()))
 
 
-def physical(positions: np.ndarray) -> dict[str, float]:
-    """The numbers of `PHYSICAL` for one motion (frames, 22, 3) metres at 20 frames per second, the floor at y = 0.
+def physical(positions: np.ndarray, fps: float = FPS) -> dict[str, float]:
+    """The numbers of `PHYSICAL` for one motion (frames, 22, 3) metres, the floor at y = 0.
 
     Skate: share of frames in %, cm/s, mm per frame (`lab.metrics.skate`); cm under the floor; m/s³; mm.
     """
-    found = skate(positions, FPS)
+    found = skate(positions, fps)
     return {
         "skate_share": 100 * found.share,
         "skate_speed": found.speed,
         "skate_slide": found.slide,
         "penetration": 100 * physics.penetration(positions),
-        "jerk": physics.jerk(positions, FPS).mean,
+        "jerk": physics.jerk(positions, fps).mean,
         "bone_error": 1000 * physics.bone_length_error(positions),
     }
 
@@ -254,9 +261,9 @@ def averaged(numbers: Sequence[Sequence[float]] | Array, frames: Sequence[int]) 
     return dict(zip(PHYSICAL, np.average(np.asarray(numbers), axis=0, weights=frames).tolist(), strict=True))
 
 
-def physical_mean(clips: Sequence[np.ndarray]) -> dict[str, float]:
+def physical_mean(clips: Sequence[np.ndarray], fps: float = FPS) -> dict[str, float]:
     """The numbers of `PHYSICAL` of several clips, weighted by length."""
-    return averaged([list(physical(clip).values()) for clip in clips], [len(clip) for clip in clips])
+    return averaged([list(physical(clip, fps).values()) for clip in clips], [len(clip) for clip in clips])
 
 
 def replicated(

@@ -14,9 +14,11 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.features.representation import BABEL, HUMANML3D, Representation, named
 from motionloom.io.atomic import finished
-from motionloom.io.text import read_utf8
+from motionloom.io.text import plain_json, read_utf8
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_bytes
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.papers.readers import find_pairs, find_takes
 from motionloom_lab.suites.protocol import MOST_ITEMS, Selection
@@ -114,14 +116,26 @@ class Item:
     split: str
     captions: tuple[Caption, ...]
     features: np.ndarray
-    """(frames, 263) float32, not standardised, 20 frames per second."""
+    """(frames, numbers) float32, not standardised, at the rate of their representation."""
 
 
 def fitting(folder: Path | str, selection: Selection | None) -> Selection:
-    """What is selected by default: the test set of HumanML3D, of other folders `Selection`'s defaults."""
+    """What is selected by default: HumanML3D's test set, BABEL's validation set, of others `Selection`'s defaults."""
+    if built_of(folder) is BABEL:
+        chosen = selection or Selection(splits=("val",))
+        return replace(chosen, sources=(), shortest=BABEL.shortest, longest=BABEL.longest)
     if not (Path(folder) / "new_joint_vecs").is_dir():
         return selection or Selection()
     return replace(selection or Selection(splits=("test",)), sources=("humanml3d",))
+
+
+def built_of(folder: Path | str) -> Representation | None:
+    """What the numbers of a built set are; None for another folder."""
+    place = Path(folder) / "set.json"
+    if not place.is_file():
+        return None
+    about = plain_json(read_bytes(place, max_bytes=_MAX_TEXT))
+    return named(str(about.get("features", HUMANML3D.name))) if isinstance(about, dict) else None
 
 
 def read_items(folder: Path | str, selection: Selection) -> list[Item]:
@@ -193,7 +207,8 @@ def _described(clip: Clip) -> Iterator[Item]:
         captions = tuple(Caption(text.strip()) for text in note.texts if text.strip())
         if note.kind == "human" and captions:
             part = clip.features[note.first : note.last].astype(np.float32)
-            name = f"{clip.name}@{note.first / FPS:g}-{note.last / FPS:g}"
+            fps = clip.representation.fps
+            name = f"{clip.name}@{note.first / fps:g}-{note.last / fps:g}"
             yield Item(name, clip.source, clip.split, captions, part)
 
 

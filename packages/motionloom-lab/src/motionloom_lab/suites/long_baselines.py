@@ -6,7 +6,7 @@ by h / 2 at each seam.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, TypeAlias, Unpack
 
@@ -15,13 +15,14 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.features.representation import HUMANML3D, of_width
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.tasks.long import compose, long_features
 from motionloom.tasks.text import sample_features
 from motionloom.weights.prior import Prior
 from motionloom_lab.papers.baselines import BLANK, slerp_joined
-from motionloom_lab.papers.double_take import TakeSettings, double_take_features
+from motionloom_lab.papers.double_take import TakeSettings, double_take_features, rows_of
 from motionloom_lab.suites.protocol import Transitions
 
 Array: TypeAlias = np.ndarray
@@ -29,10 +30,10 @@ Array: TypeAlias = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Long:
-    """One long motion at 20 frames per second."""
+    """One long motion at the frame rate of its representation."""
 
     features: Array
-    """(frames, 263), not standardised: what the evaluator reads."""
+    """(frames, numbers), not standardised: what the evaluator reads."""
     positions: Array
     """(frames, 22, 3) metres: what the physical numbers read."""
 
@@ -42,31 +43,33 @@ Method: TypeAlias = Callable[[Sequence[str], Sequence[int], int], Long]
 
 
 def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) -> dict[str, Method]:
-    """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not, and for none."""
-    chosen = list(dict.fromkeys(DEFAULT if names is None else names))
-    if not chosen:
+    """The rows of the protocol's table and the named ways, in that order (default `DEFAULT`).
+
+    Raises MotionloomError for a name there is not, and for none.
+    """
+    rows = {name: partial(_variant, name=name) for name in how.variants}
+    only = () if of_width(len(prior.mean)) is HUMANML3D else BODIES
+    usual = () if rows else [name for name in DEFAULT if name not in only]
+    chosen = list(dict.fromkeys(usual if names is None else names))
+    if not chosen and not rows:
         raise MotionloomError(f"no method is named; the methods are {', '.join(_MAKERS)}")
     for name in chosen:
         if name not in _MAKERS:
             raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(_MAKERS)}")
+        if name in only:
+            raise MotionloomError(f"the method {name!r} needs weights of {HUMANML3D}; these draw {len(prior.mean)}")
 
     def method(name: str) -> Method:
-        return lambda prompts, frames, seed: _MAKERS[name][1](Request(prior, how, prompts, frames, seed))
+        make = rows.get(name) or _MAKERS[name][1]
+        return lambda prompts, frames, seed: make(Request(prior, how, prompts, frames, seed))
 
-    return {name: method(name) for name in chosen}
-
-
-def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
-    """Row lengths of DoubleTake whose unfolded frames and seams are those of the visible ``frames``."""
-    half, last = handshake // 2, len(frames) - 1
-    rest = handshake - half
-    return [n + (half if i > 0 else 0) + (rest if i < last else 0) for i, n in enumerate(frames)]
+    return {name: method(name) for name in (*rows, *chosen)}
 
 
 def from_features(features: np.ndarray) -> Long:
     """Features as the network samples them, decoded once."""
     numbers = features.astype(np.float64)
-    return Long(numbers, humanml.decode_positions(numbers))
+    return Long(numbers, of_width(numbers.shape[1]).decode_positions(numbers))
 
 
 def from_positions(positions: Array) -> Long:
@@ -89,10 +92,10 @@ class Request:
     @property
     def segments(self) -> list[Segment]:
         """The prompts with their seconds."""
-        return [Segment(text, n / FPS) for text, n in zip(self.prompts, self.frames, strict=True)]
+        return [Segment(text, n / self.prior.fps) for text, n in zip(self.prompts, self.frames, strict=True)]
 
     def alone(self, frames: Sequence[int]) -> list[np.ndarray]:
-        """Every prompt by itself, (frames, 263) each."""
+        """Every prompt by itself, (frames, numbers) each."""
         seeds = [self.seed + row for row in range(len(self.prompts))]
         return sample_features(self.prior, self.prompts, frames, seeds=seeds, **self.how.drawing)
 
@@ -112,13 +115,23 @@ def _double_take(
     request: Request, mode: Literal["published", "paper"] = "published", **more: Unpack[TakeSettings]
 ) -> Long:
     how = request.how
-    settings: TakeSettings = {**how.drawing, **more}
+    shares = {"soft": how.soft, "hard": how.hard, "restart": how.restart}
+    chosen = {name: share for name, share in shares.items() if share is not None}
+    settings: TakeSettings = {**how.drawing, **chosen, **more}  # type: ignore[typeddict-item]
     rows = rows_of(request.frames, how.handshake)
-    joins = {"handshake": how.handshake, "ramp": how.blend}
+    joins = {"handshake": how.handshake, "ramp": how.ramp}
     features, _ = double_take_features(
         request.prior, request.prompts, rows, mode=mode, seed=request.seed, **joins, **settings
     )
     return from_features(features)
+
+
+def _variant(request: Request, *, name: str) -> Long:
+    """A row of the protocol's table."""
+    changes = dict(request.how.variants[name])
+    takes: TakeSettings = {key: changes.pop(key) for key in [*changes] if key.endswith("_take_only")}  # type: ignore[assignment]
+    how = replace(request.how, **changes)
+    return _double_take(replace(request, how=how), mode=how.mode, **takes)  # type: ignore[arg-type]
 
 
 def _slerp(request: Request) -> Long:
@@ -140,6 +153,8 @@ _MAKERS: Mapping[str, tuple[str, Callable[[Request], Long]]] = {
     "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
     "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),
 }
+BODIES = ("ours-exported", "slerp")
+"""Ways that place a body by HumanML3D's numbers."""
 DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
 """Without second take only and without the slow ones of 1000 steps."""
 TITLES = {name: title for name, (title, _) in _MAKERS.items()}

@@ -53,9 +53,11 @@ def transitions(job: "Job", options: Options) -> Report:
     from motionloom_lab.suites import transitions
     from motionloom_lab.suites.protocol import Transitions, quick_transitions
 
-    how = with_asked(Transitions(), options)
+    run = job.run("transitions")
+    how = with_asked(Transitions.of(run.judge(None).representation), options)
     how = quick_transitions(how) if options.get("quick") else how
-    return transitions.run(job.run("transitions"), selection=selection(options), how=how, names=options.get("methods"))
+    beside = options.get("beside", ())
+    return transitions.run(run, selection=selection(options), how=how, names=options.get("methods"), beside=beside)
 
 
 def control(job: "Job", options: Options) -> Report:

@@ -7,12 +7,14 @@ batches of 32, replications with a 95 % interval of 1.96 sigma / sqrt(replicatio
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from string import Formatter
 from typing import Any, Literal, TypedDict
 
 from motionloom.diffusion import SOLVERS
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.features.representation import Representation
 from motionloom.reading import read_table
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 
@@ -73,12 +75,22 @@ class Transitions:
     """Long motions out of several captions, and the stretches around their seams (PriorMDM's protocol)."""
 
     handshake: int = 20
-    """Frames that two neighbours share: 20 for HumanML3D, 30 for BABEL."""
+    """Frames that two neighbours share: 20 for HumanML3D, 30 for BABEL (`Transitions.of`)."""
     margin: int = 40
     """Frames around the handshake that belong to the transition, half on either side."""
     unfoldings: int = 2
-    blend: int = 10
-    """Frames over which neighbours are blended."""
+    ramp: int = 10
+    """Frames on either side of a handshake that DoubleTake's second take may change (b)."""
+    soft: float | None = None
+    """M_soft, M_hard and T' of DoubleTake (`papers.double_take.TakeSettings`); None: those of its mode."""
+    hard: float | None = None
+    restart: float | None = None
+    rows: str = ""
+    """A table of ``tables.toml`` whose rows are measured; empty: none."""
+    clip: int = 196
+    """Frames of the longest motion that the priors saw."""
+    mode: str = "paper"
+    """DoubleTake of the rows of a table: as the paper describes it, or ``published`` as the released code has it."""
     intervals: int = 32
     """Captions of one long motion, and of one batch of R-precision."""
     replications: int = 3
@@ -90,9 +102,12 @@ class Transitions:
         frames, several = (0, 100), (1, 1000)
         check_ranges(
             self,
-            {"handshake": (1, 100), "margin": frames, "blend": frames, "unfoldings": several, "intervals": several},
+            {"handshake": (1, 100), "margin": frames, "ramp": frames, "unfoldings": several, "intervals": several},
         )
         check_ranges(self, {"replications": (1, MOST_REPLICATIONS), "steps": (1, 1000), "guidance": GUIDANCES})
+        known = ("", *tables())
+        _need(self.rows in known, f"the tables are {', '.join(known[1:])}; got {self.rows!r}")
+        _need(self.mode in ("paper", "published"), f"DoubleTake's modes are paper and published; got {self.mode!r}")
         check_ranges(self, {"seed": (0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE)})
 
     @property
@@ -100,15 +115,28 @@ class Transitions:
         """Frames of a transition: 60 for HumanML3D."""
         return self.handshake + self.margin
 
+    @staticmethod
+    def of(kind: Representation) -> "Transitions":
+        """The usual protocol for a representation: a handshake of one second."""
+        return Transitions(handshake=kind.second, clip=kind.longest)
+
+    @property
+    def variants(self) -> Mapping[str, Mapping[str, Any]]:
+        """Settings of the rows of the table, by their names."""
+        return tables()[self.rows] if self.rows else {}
+
     @property
     def shortest(self) -> int:
-        """Visible frames of an interval at least: DoubleTake's rows need two handshakes, two blends and 10 frames."""
-        return 2 * self.handshake + 2 * self.blend + 10 - self.handshake // 2
+        """Visible frames of an interval at least: two handshakes, two ramps and 10 frames in each row."""
+        joins = [(self.handshake, self.ramp)]
+        joins += [(row.get("handshake", self.handshake), row.get("ramp", self.ramp)) for row in self.variants.values()]
+        return max(2 * h + 2 * b + 10 - h // 2 for h, b in joins)
 
     @property
     def longest(self) -> int:
-        """Visible frames at most: with both handshakes a row then has the 196 that HumanML3D's priors saw."""
-        return max(self.shortest, 196 - self.handshake)
+        """Visible frames at most: with both handshakes a row then has as many as the priors saw."""
+        handshakes = (row.get("handshake", self.handshake) for row in self.variants.values())
+        return max(self.shortest, self.clip - max(self.handshake, *handshakes, 0))
 
     @property
     def seams(self) -> int:
@@ -130,8 +158,18 @@ class Transitions:
 
     def described(self) -> dict[str, Any]:
         """For a report."""
+        shares = {"M_soft": self.soft, "M_hard": self.hard, "T'": self.restart}
+        takes = [f"{name} = {share:g}" for name, share in shares.items() if share is not None]
+        takes += [f"the rows of {self.rows} are of its mode {self.mode!r}"] if self.rows else []
         values = {"how": self, "solver": SOLVER, "spacing": SPACING, "guidance": float(self.guidance)}
+        values["takes"] = "; ".join(takes) or "M_soft, M_hard and T' of its modes"
         return reported("transitions", values)
+
+
+@cache
+def tables() -> dict[str, dict[str, dict[str, Any]]]:
+    """The tables of ``tables.toml``: settings by the names of rows, by the names of tables."""
+    return read_table("motionloom_lab.suites", "tables.toml")
 
 
 class LongDrawing(TypedDict):

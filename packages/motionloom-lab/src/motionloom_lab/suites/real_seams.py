@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.features.representation import HUMANML3D, of_width
 from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.reading import read_bytes
@@ -53,7 +53,7 @@ class SeamCrops:
     """One random window of each real motion that is long enough, embedded; and the motions to draw others from."""
 
     motions: tuple[np.ndarray, ...]
-    """(frames, 263) each, at least a window long."""
+    """(frames, numbers) each, at least a window long."""
     window: int
     embeddings: Array
     mean_jerk: float
@@ -81,22 +81,24 @@ class SeamCrops:
 def _windows(motions: Sequence[np.ndarray], window: int, rng: np.random.Generator) -> SeamWindows:
     starts = [int(rng.integers(len(one) - window + 1)) for one in motions]
     parts = [one[start : start + window] for one, start in zip(motions, starts, strict=True)]
-    return SeamWindows(tuple(parts), np.stack([humanml.decode_positions(part.astype(np.float64)) for part in parts]))
+    return SeamWindows(tuple(parts), np.stack([decoded(part) for part in parts]))
 
 
-def jerks(positions: np.ndarray, reference: float) -> dict[str, float]:
-    """Peak jerk and both areas of the mean curve of windows (windows, frames, 22, 3)."""
+def decoded(features: np.ndarray) -> Array:
+    """(frames, 22, 3) metres of features (frames, numbers), not standardised."""
+    return of_width(features.shape[1]).decode_positions(features.astype(np.float64))
+
+
+def jerks(positions: np.ndarray, reference: float, fps: float = HUMANML3D.fps) -> dict[str, float]:
+    """Peak jerk and areas of the mean curve of windows (windows, frames, 22, 3); one to HumanML3D's at its rate."""
     curve = jerk_curve(positions)
-    return {
-        "pj": peak_jerk(curve),
-        "auj": area_under_jerk(curve, reference),
-        "auj_humanml3d": area_under_jerk(curve, JERK_HUMANML3D),
-    }
+    found = {"pj": peak_jerk(curve), "auj": area_under_jerk(curve, reference)}
+    return found | ({"auj_humanml3d": area_under_jerk(curve, JERK_HUMANML3D)} if fps == HUMANML3D.fps else {})
 
 
-def averaged(clips: Sequence[np.ndarray]) -> dict[str, float]:
+def averaged(clips: Sequence[np.ndarray], fps: float = HUMANML3D.fps) -> dict[str, float]:
     """`PHYSICAL` of clips (frames, 22, 3), weighted by length."""
-    numbers = physical_mean(clips)
+    numbers = physical_mean(clips, fps)
     return {short: numbers[name] for short, name in PHYSICAL.items()}
 
 

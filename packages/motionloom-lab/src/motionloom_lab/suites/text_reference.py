@@ -15,8 +15,7 @@ import numpy as np
 from safetensors import safe_open
 
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import WIDTH
+from motionloom.features.representation import of_width
 from motionloom.io.atomic import check_place
 from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
@@ -102,13 +101,14 @@ def measure(items: Sequence[Item], evaluator: Evaluator, selection: Selection, p
 
 
 def of_features(features: np.ndarray) -> dict[str, float]:
-    """`harness.physical` of a motion (frames, 263), not standardised, as the network samples it."""
-    return physical(humanml.decode_positions(np.asarray(features, dtype=np.float64)))
+    """`harness.physical` of a motion (frames, numbers), not standardised, as the network samples it."""
+    kind = of_width(features.shape[1])
+    return physical(kind.decode_positions(np.asarray(features, dtype=np.float64)), kind.fps)
 
 
 def probe(evaluator: Evaluator) -> Array:
     """(2, width): a caption and a motion that nobody ever recorded, as the evaluator sees them."""
-    wave = np.sin(np.arange(48)[:, None] * 0.1 + np.arange(WIDTH)[None])
+    wave = np.sin(np.arange(48)[:, None] * 0.1 + np.arange(evaluator.representation.width)[None])
     texts = evaluator.texts([SENTENCE])
     return np.concatenate([texts, evaluator.motions([0.1 * wave])]).astype(np.float64)
 

@@ -7,14 +7,15 @@ every way is kept in a small file as it is done; a run that was stopped goes on 
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.representation import Representation
 from motionloom.kinematics.physics import Array
+from motionloom.weights.prior import find_weights
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics.retrieval import fid, fid_bias, matching_distance, r_precision
 from motionloom_lab.metrics.transitions import (
@@ -27,7 +28,7 @@ from motionloom_lab.metrics.transitions import (
 from motionloom_lab.report.report import REAL, Report
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import harness, text_reference
-from motionloom_lab.suites.harness import Parts, Run, diversity, embedded, replicated, row_of
+from motionloom_lab.suites.harness import Parts, Run, digest, diversity, embedded, replicated, row_of
 from motionloom_lab.suites.items import fitting, read_items
 from motionloom_lab.suites.long_baselines import Long, Method, methods, titled
 from motionloom_lab.suites.protocol import Selection, Transitions
@@ -54,6 +55,13 @@ class SeamTrial:
     crops: SeamCrops | None
     """Windows of real motion; None where only the shipped numbers are at hand."""
     shipped: Shipped | None = None
+    handshakes: SeamCrops | None = None
+    """Windows of real motion as long as a handshake: what transitions are compared with that have no margin."""
+
+    @property
+    def kind(self) -> Representation:
+        """What the numbers of all motions are."""
+        return self.evaluator.representation
 
     def requests(self, replication: int) -> Iterator[tuple[list[int], list[Caption], list[int]]]:
         """For each long motion of a replication: its items, their captions, and the visible frames."""
@@ -68,7 +76,13 @@ class SeamTrial:
 
 
 def prepare(
-    evaluator: Evaluator, real: TextReference, how: Transitions, crops: SeamCrops | None, shipped: Shipped | None = None
+    evaluator: Evaluator,
+    real: TextReference,
+    how: Transitions,
+    crops: SeamCrops | None,
+    shipped: Shipped | None = None,
+    *,
+    handshakes: SeamCrops | None = None,
 ) -> SeamTrial:
     """Checks that there is enough real motion; MotionloomError where there is not."""
     need = how.unfoldings * how.intervals
@@ -87,7 +101,7 @@ def prepare(
     if crops is None and shipped is None:
         raise MotionloomError("this copy ships no numbers of real transitions; name real motions with --data")
     mean = crops.mean_jerk if crops is not None else shipped.mean_jerk  # type: ignore[union-attr]
-    return SeamTrial(evaluator, real, how, mean, crops, shipped)
+    return SeamTrial(evaluator, real, how, mean, crops, shipped, handshakes)
 
 
 # ---- one replication -------------------------------------------------------------------------------------------------
@@ -111,25 +125,27 @@ def windows(frames: Sequence[int], size: int) -> list[slice]:
 def of_method(trial: SeamTrial, method: Method, replication: int) -> dict[str, float]:
     """All columns for one way; the time goes to making the motions alone."""
     how = trial.how
-    middles, seams, texts, around, inside, steps = [], [], [], [], [], []
+    middles, seams, shakes, texts, around, inside, steps = [], [], [], [], [], [], []
     spent = total = 0.0
     for unfolding, (_, captions, frames) in enumerate(trial.requests(replication)):
         start = time.perf_counter()
         motion = method([caption.text for caption in captions], frames, how.first_seed(replication, unfolding))
-        spent, total = spent + time.perf_counter() - start, total + sum(frames) / FPS
-        _check(motion, sum(frames))
+        spent, total = spent + time.perf_counter() - start, total + sum(frames) / trial.kind.fps
+        _check(motion, sum(frames), trial.kind)
         texts += captions
         middles += [motion.features[part] for part in cut(frames, how.handshake // 2)]
         parts = windows(frames, how.window)
         seams += [motion.features[part] for part in parts]
+        shakes += [motion.features[part] for part in windows(frames, how.handshake)]
         around += [motion.positions[part] for part in parts]
         inside += [motion.positions[p] for p in cut(frames, how.window // 2) if p.stop - p.start >= LEAST_INSIDE]
         steps += transition_distance(motion.positions, np.cumsum(frames)[:-1].tolist()).tolist()
     result = _matched(trial, texts, embedded(trial.evaluator, middles), replication)
     result |= _around(trial, seams, np.stack(around), replication)
+    result |= _handshakes(trial, shakes, replication)
     result |= {"step": 1000 * float(np.mean(steps)), "cost": spent / total}
     if inside:
-        result |= {f"inside_{name}": value for name, value in averaged(inside).items()}
+        result |= {f"inside_{name}": value for name, value in averaged(inside, trial.kind.fps).items()}
         own = np.concatenate([sequence_jerk(part[None])[0] for part in inside]).mean()
         result["auj_own"] = area_under_jerk(jerk_curve(np.stack(around)), float(own))
     return result
@@ -143,9 +159,12 @@ def of_real(trial: SeamTrial, replication: int) -> dict[str, float]:
     numbers = harness.averaged(trial.real.physical, trial.real.frames)
     result |= {f"inside_{short}": numbers[name] for short, name in PHYSICAL.items()}
     if trial.crops is not None:
-        other = trial.crops.again(trial.how.seams, seed=(trial.how.seed, replication, 1))
+        seed = trial.how.seed, replication, 1
+        other = trial.crops.again(trial.how.seams, seed=seed)
         result |= _around(trial, other.features, other.positions, replication)
         result["step"] = 1000 * other.step
+        if trial.handshakes is not None:
+            result |= _handshakes(trial, trial.handshakes.again(trial.how.seams, seed=seed).features, replication)
     elif trial.shipped is not None:
         result |= trial.shipped.row(trial.how)
     if "auj" in result:
@@ -169,8 +188,8 @@ def _around(
 ) -> dict[str, float]:
     """Numbers of windows: features of each, and positions (windows, frames, 22, 3)."""
     result = {
-        **jerks(positions, trial.mean_jerk),
-        **{f"seam_{name}": value for name, value in averaged(list(positions)).items()},
+        **jerks(positions, trial.mean_jerk, trial.kind.fps),
+        **{f"seam_{name}": value for name, value in averaged(list(positions), trial.kind.fps).items()},
     }
     if trial.crops is not None:
         embeddings = embedded(trial.evaluator, features)
@@ -179,8 +198,17 @@ def _around(
     return result
 
 
-def _check(motion: Long, frames: int) -> None:
-    if motion.features.shape != (frames, WIDTH) or motion.positions.shape != (frames, 22, 3):
+def _handshakes(trial: SeamTrial, features: Sequence[np.ndarray], replication: int) -> dict[str, float]:
+    """Numbers of windows that are as long as a handshake."""
+    if trial.handshakes is None:
+        return {}
+    embeddings = embedded(trial.evaluator, features)
+    distance = fid(embeddings, trial.handshakes.embeddings)
+    return {"handshake_fid": distance, "handshake_diversity": diversity(embeddings, replication)}
+
+
+def _check(motion: Long, frames: int, kind: Representation) -> None:
+    if motion.features.shape != (frames, kind.width) or motion.positions.shape != (frames, 22, 3):
         raise ValueError(f"a method gave {motion.features.shape} and {motion.positions.shape} for {frames} frames")
     if not (np.isfinite(motion.features).all() and np.isfinite(motion.positions).all()):
         raise MotionloomError("a method drew numbers that are not finite; these weights cannot be measured so")
@@ -212,7 +240,7 @@ def measure(
         **trial.real.selection.described(),
         "items": len(trial.real.names),
         "evaluator": trial.evaluator.name,
-        "representation": "HumanML3D at 20 frames per second, positions as the network draws them (not finished)",
+        "representation": f"{trial.kind}, positions as the network draws them (not finished)",
         **how.described(),
     }
     title = f"Long motion and its transitions: {run.label}"
@@ -230,23 +258,47 @@ def _notes(trial: SeamTrial) -> tuple[str, ...]:
 
 
 def run(
-    run: Run, *, selection: Selection | None = None, how: Transitions | None = None, names: Sequence[str] | None = None
+    run: Run,
+    *,
+    selection: Selection | None = None,
+    how: Transitions | None = None,
+    names: Sequence[str] | None = None,
+    beside: Sequence[str] = (),
 ) -> Report:
     """Measure weights by the named ways of making long motion (default `long_baselines.DEFAULT`).
 
     Args:
         run: the weights, the data, who judges, and where pieces are kept.
         selection: which real motions of the data; None: the usual ones.
-        how: the protocol.
+        how: the protocol; None: the usual one for what the evaluator reads.
         names: the rows.
+        beside: further weights, each of which has all rows too; the names of rows then end with those of the weights.
     """
-    how = how or Transitions()
-    ways = methods(run.prior(how.steps), how, names)
-    judge = run.judge()
+    judge = run.judge(None)
+    how = how or Transitions.of(judge.representation)
+    ways = _ways_of(run, beside, how, names, judge.representation)
     trial = real_motion(judge, run.data, selection, how, run.progress)
-    windows = {"windows": trial.crops is not None}
-    parts = run.parts({**how.sampling(), **run.settings(judge), "real": identity(trial.real), **windows})
+    more: dict[str, object] = {"windows": trial.crops is not None}
+    if beside:
+        more["beside"] = [digest(find_weights(weights)) for weights in beside]
+    parts = run.parts({**how.sampling(), **run.settings(judge), "real": identity(trial.real), **more})
     return measure(trial, ways, run, parts=parts)
+
+
+def _ways_of(
+    run: Run, beside: Sequence[str], how: Transitions, names: Sequence[str] | None, kind: Representation
+) -> dict[str, Method]:
+    """The ways of the run's weights and of those beside them, by the names of rows."""
+    if not beside:
+        return methods(run.prior(how.steps, kind), how, names)
+    runs = [replace(run, weights=str(weights)) for weights in (run.weights, *beside)]
+    if len({one.label for one in runs}) < len(runs):
+        raise MotionloomError(
+            f"rows are called by the names of weights, and these are not all different: "
+            f"{', '.join(one.label for one in runs)}; name each file once, by a name of its own"
+        )
+    every = [(one.label, methods(one.prior(how.steps, kind), how, names)) for one in runs]
+    return {f"{name}, {label}": method for label, ways in every for name, method in ways.items()}
 
 
 def real_motion(
@@ -257,6 +309,12 @@ def real_motion(
         return prepare(judge, text_reference.load_shipped(judge, selection), how, None, load_shipped())
     chosen = fitting(data, selection)
     items = read_items(data, chosen)
+    width = items[0].features.shape[1]
+    if width != judge.representation.width:
+        raise MotionloomError(f"{data} has {width} numbers per frame; {judge.name} reads {judge.representation}")
     real = text_reference.measure(items, judge, chosen, progress)
-    crops = SeamCrops.of([item.features for item in items], how.window, judge, seed=how.seed)
-    return prepare(judge, real, how, crops)
+    features = [item.features for item in items]
+    crops = SeamCrops.of(features, how.window, judge, seed=how.seed)
+    enough = how.handshake >= LEAST_INSIDE
+    handshakes = SeamCrops.of(features, how.handshake, judge, seed=how.seed) if enough else None
+    return prepare(judge, real, how, crops, handshakes=handshakes)

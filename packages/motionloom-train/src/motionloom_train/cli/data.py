@@ -7,7 +7,8 @@ from motionloom.cli.tables import add_family
 from motionloom.cli.writing import check_overwriting
 
 READERS = "motionloom_lab.papers.readers"
-"""The module of the laboratory that knows the data sets that others published."""
+BABEL = "motionloom_lab.papers.babel"
+"""The modules of the laboratory that know the data sets that others published."""
 
 
 def add(subparsers) -> None:
@@ -19,6 +20,9 @@ def run_build(arguments: argparse.Namespace) -> None:
     """``motionloom data build``."""
     from motionloom_train.data.build import build
 
+    if arguments.features == "babel":
+        import_module(BABEL).build_set(arguments.folders, arguments.out)
+        return
     build(
         arguments.folders,
         arguments.out,

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import LAYOUT
 from motionloom.reading import read_table
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.clips import GESTURE, MEASURED
@@ -32,11 +31,13 @@ class Batch:
     """Windows of motion with their sentences."""
 
     features: Tensor
-    """(rows, frames, 263) standardised; zeros behind each row's length; on the device of the set's features."""
+    """(rows, frames, numbers) standardised; zeros behind each row's length; on the device of the set's features."""
     lengths: Tensor
     """(rows,) valid frames."""
     texts: Tensor
     """(rows,) numbers of sentences."""
+    flags: Tensor | None = None
+    """(rows, frames) int64: 1 where one action becomes another; None where the set does not say."""
 
 
 class Batches:
@@ -65,8 +66,10 @@ class Batches:
         place = data.features.device
         self._mean, self._std = data.mean.to(place), data.std.to(place)
         self._heights = torch.zeros(len(data.mean), dtype=torch.bool)
-        self._heights[HEIGHTS] = True
+        self._heights[list(data.representation.heights)] = True
         self._heights = self._heights.to(place)
+        self.flagged = data.flags is not None
+        self._flags = torch.zeros(0, dtype=torch.long) if data.flags is None else data.flags.to(place)
         allowed = data.may_begin if data.may_begin is not None else np.ones(len(data.features), dtype=bool)
         starts = nearest(allowed)
         self._fresh = fresh
@@ -109,7 +112,9 @@ class Batches:
         crops = features[(starts[:, None] + frames).clamp(max=len(features) - 1)]
         if picked.is_cuda or bool(climbs.any()):
             crops = torch.where(climbs.bool()[:, None, None], crops - self._above_floor(crops), crops)
-        return Batch(crops * (frames < lengths[:, None])[..., None], lengths, texts)
+        valid = frames < lengths[:, None]
+        flags = self._flags[(starts[:, None] + frames).clamp(max=len(features) - 1)] * valid if self.flagged else None
+        return Batch(crops * valid[..., None], lengths, texts, flags)
 
     def _above_floor(self, crops: Tensor) -> Tensor:
         """How much windows (rows, frames, 263), standardised, are lowered so that their first frames touch the floor.
@@ -247,8 +252,6 @@ def _favour(name: str, favour: Mapping[str, float]) -> float:
 
 CLIMBS = {"climb", "climb stairs", f"{PREFIX}climb ladder", f"{PREFIX}stairs"}
 """Groups of items that go up."""
-HEIGHTS = [LAYOUT["root_height"].start, *range(LAYOUT["ric"].start + 1, LAYOUT["ric"].stop, 3)]
-"""Features that are heights over the floor."""
 ABRUPT = 0.3
 """How often an item is sampled whose windows all begin in full motion, among those of its group."""
 BEFORE, ABOUT = 16, 2

@@ -1,15 +1,14 @@
 """The clips of a built set: features with captions, one safetensors file each."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from safetensors import safe_open
 
 from motionloom.errors import MotionloomError
-from motionloom.features.humanml import decode_positions
-from motionloom.features.layout import WIDTH
+from motionloom.features.representation import Representation, of_width
 from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
@@ -56,20 +55,29 @@ class Clip:
     with M in their name."""
     notes: tuple[Note, ...]
     features: np.ndarray
-    """(frames, 263) float32, not standardised."""
+    """(frames, numbers of its representation) float32, not standardised."""
     kind: str = "capture"
     """``capture``, ``keyed`` (animated by hand) or ``made`` (arms moved by rule on a recorded body)."""
 
+    flags: np.ndarray | None = None
+    """(frames,) bool: where one action becomes another; None: nobody said."""
+
+    @property
+    def representation(self) -> Representation:
+        """What its numbers are."""
+        return of_width(self.features.shape[1])
+
     def positions(self, first: int = 0, last: int | None = None) -> Array:
         """(frames, 22, 3) metres of a stretch of frames, or of all."""
-        return decode_positions(self.features[first:last].astype(np.float64))
+        return self.representation.decode_positions(self.features[first:last].astype(np.float64))
 
 
 def write_clip(folder: Path, clip: Clip) -> None:
     """One file ``folder/NAME.safetensors``, whole or not at all."""
-    about = {k: v for k, v in asdict(clip).items() if k != "features"}
+    about = {k: v for k, v in asdict(clip).items() if k not in ("features", "flags")}
+    flags = {} if clip.flags is None else {"flags": np.ascontiguousarray(clip.flags, dtype=np.uint8)}
     save_tensors(
-        {"features": np.ascontiguousarray(clip.features)},
+        {"features": np.ascontiguousarray(clip.features), **flags},
         folder / f"{clip.name}.safetensors",
         metadata={"clip": json.dumps(about)},
     )
@@ -82,12 +90,14 @@ def read_clip(path: Path) -> Clip:
         with safe_open(path, framework="numpy") as file:
             about = plain_json(file.metadata()["clip"])
             features = file.get_tensor("features")
+            flags = file.get_tensor("flags") if "flags" in file.keys() else None  # noqa: SIM118
         notes = tuple(
             Note(n["first"], n["last"], n["kind"], tuple(n["texts"]), tuple(n["core"]) if n.get("core") else None)
             for n in about.pop("notes")
         )
-        clip = Clip(**about, notes=notes, features=features)
+        clip = Clip(**about, notes=notes, features=features, flags=flags)
         _check_clip(clip)
+        clip = clip if flags is None else replace(clip, flags=flags.astype(bool))
         return clip
     except DAMAGED as error:
         raise MotionloomError(
@@ -97,13 +107,11 @@ def read_clip(path: Path) -> Clip:
 
 def _check_clip(clip: Clip) -> None:
     features = clip.features
-    if (
-        features.dtype != np.float32
-        or features.ndim != 2
-        or features.shape[1] != WIDTH
-        or not np.isfinite(features).all()
-    ):
-        raise ValueError(f"its features are not finite float32 numbers of shape (frames, {WIDTH})")
+    if features.dtype != np.float32 or features.ndim != 2 or not np.isfinite(features).all():
+        raise ValueError("its features are not finite float32 numbers of shape (frames, numbers)")
+    of_width(features.shape[1])
+    if clip.flags is not None and (clip.flags.shape != features.shape[:1] or not np.isin(clip.flags, (0, 1)).all()):
+        raise ValueError("its flags are not a 0 or 1 for each frame")
     if not all(isinstance(v, str) for v in (clip.name, clip.source, clip.licence, clip.split, clip.way)):
         raise ValueError("its name, source, licence, split or way is not text")
     if clip.kind not in KINDS:

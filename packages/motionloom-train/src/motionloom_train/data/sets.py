@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, LAYOUT
+from motionloom.features.layout import FPS
+from motionloom.features.representation import HUMANML3D, Representation
 from motionloom.io.atomic import finished
 from motionloom.io.text import parse_json, read_utf8
 from motionloom.reading import read_table
@@ -104,7 +105,7 @@ class MotionSet:
     """Clips laid end to end, with what they show."""
 
     features: Tensor
-    """(frames of all clips, 263) float32, standardised."""
+    """(frames of all clips, numbers) float32, standardised."""
     mean: Tensor
     std: Tensor
     items: tuple[Item, ...]
@@ -114,6 +115,9 @@ class MotionSet:
     """Minutes of motion as recorded, without mirrored and derived copies."""
     may_begin: np.ndarray | None = None
     """(frames of all clips,) bool: where a window may begin (`data.starts`); None: anywhere."""
+    representation: Representation = HUMANML3D
+    flags: Tensor | None = None
+    """(frames of all clips,) int64: 1 where one action becomes another; None: nobody said."""
 
 
 def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Sequence[str] = ("train",)) -> list[Clip]:
@@ -131,17 +135,31 @@ def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Seque
 
 
 def statistics(clips: Sequence[Clip]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean per number and standard deviation averaged within the blocks of the layout, as published (263,) each."""
+    """Mean and standard deviation (numbers,) as published: HumanML3D's deviations averaged within each block."""
+    representation = clips[0].representation
     frames = np.concatenate([c.features for c in clips]).astype(np.float64)
     mean, std = frames.mean(0), frames.std(0)
-    for block in LAYOUT.values():
-        std[block] = max(std[block].mean(), 1e-4)
-    return mean.astype(np.float32), std.astype(np.float32)
+    for block in representation.blocks.values() if representation.by_block else ():
+        std[block] = std[block].mean()
+    return mean.astype(np.float32), np.maximum(std, 1e-4).astype(np.float32)
 
 
-def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) -> MotionSet:
-    """Read the training split of a built set. ``seed`` fixes the wordings of measured labels."""
+def load_set(
+    folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, only: Representation | None = None
+) -> MotionSet:
+    """Read the training split of a built set.
+
+    seed: fixes the wordings of measured labels. only: the representation that is needed; None: any.
+    Raises MotionloomError where the set is of another, or of several.
+    """
     clips = read_clips(folder, sources=sources)
+    representation = clips[0].representation
+    other = next((clip for clip in clips if clip.representation is not (only or representation)), None)
+    if other is not None:
+        raise MotionloomError(
+            f"{folder}: {other.name} has {other.representation}, and {only or representation} are needed here; build a "
+            "set of them, see 'motionloom data build --help'"
+        )
     mean, std = statistics(clips)
     rng = np.random.default_rng(seed)
     texts: dict[str, int] = {}
@@ -164,7 +182,9 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
         start += len(clip.features)
     features = torch.from_numpy(np.concatenate([c.features for c in clips]))
     features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
-    recorded = sum(len(c.features) for c in clips if c.way == "plain" and not c.name.startswith("M")) / 20 / 60
+    plain = (c for c in clips if c.way == "plain" and not c.name.startswith("M"))
+    recorded = sum(len(c.features) for c in plain) / representation.fps / 60
+    standing = representation is HUMANML3D  # `may_begin` reads its velocities
     return MotionSet(
         features,
         torch.from_numpy(mean),
@@ -173,8 +193,16 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0) 
         tuple(texts),
         tuple(sorted({c.licence for c in clips})),
         recorded,
-        np.concatenate([may_begin(c.features) for c in clips]),
+        np.concatenate([may_begin(c.features) for c in clips]) if standing else None,
+        representation,
+        _flags(clips),
     )
+
+
+def _flags(clips: Sequence[Clip]) -> Tensor | None:
+    if any(clip.flags is None for clip in clips):
+        return None
+    return torch.from_numpy(np.concatenate([np.asarray(clip.flags, dtype=np.int64) for clip in clips]))
 
 
 def _worded(

@@ -6,6 +6,7 @@ from argparse import Namespace
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +32,17 @@ from motionloom.io.stream import Stream, resampled
 from motionloom.kinematics.deeds import LONGEST, happened
 from motionloom.motion import Motion
 from motionloom.requests.reading import resolve_sampling
+from motionloom.requests.sampling import Sampling
 from motionloom.requests.tasks import Compose
 from motionloom.tasks import reattempts
 from motionloom.tasks.long import load_segment_adapters
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.splice import concatenate
+from motionloom.tasks.text import finish
 from motionloom.weights.prior import Prior
 
+DOUBLE_TAKE = "motionloom_lab.papers.double_take"
+"""The method as published, in the laboratory; opened where it is asked for."""
 REMARKED = 200
 """Segments whose texts are looked up among what the weights know."""
 LISTED = 40
@@ -59,7 +64,7 @@ def run_compose(arguments: Namespace) -> int:
     check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
     timeline = replace(timeline, segments=load_segment_adapters(prior, timeline.segments))
-    streams = _open(arguments, outs, timeline, target)
+    streams = _open(arguments, outs, timeline, target, prior.fps)
     record: list[Motion] = []
     missed: list[str] = []
     interrupted = _make(arguments, prior, timeline, streams, record, missed)
@@ -93,10 +98,11 @@ def _timeline(arguments: Namespace, metre: float) -> Timeline:
     return timeline.read_timeline(files[0], metre)
 
 
-def _open(arguments: Namespace, outs: Sequence[Path], timeline: Timeline, target: Target) -> list[Stream]:
-    """The files, those that grow on the disk last: they are closed first, and that is quick."""
-    rate = arguments.fps or 20.0
-    total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
+def _open(arguments: Namespace, outs: Sequence[Path], timeline: Timeline, target: Target, own: float) -> list[Stream]:
+    """The files, those that grow on the disk last: they are closed first, and that is quick. own: the weights' rate."""
+    rate = arguments.fps or own
+    frames = sum(round(segment.seconds * own) for segment in timeline.segments)
+    total = int((frames - 1) / own * rate + 1e-6) + 1
     caption = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
     streams = [target.open(out, total=total, fps=rate, caption=caption) for out in outs]
     return sorted(streams, key=lambda stream: target.skeleton is None and stream.path.suffix.lower() == ".bvh")
@@ -143,6 +149,9 @@ def _recorded(record: list[Motion], pieces: Iterable[Motion]) -> Generator[Motio
 
 def _pieces(arguments: Namespace, prior: Prior, timeline: Timeline, missed: list[str]) -> Generator[Motion, None, None]:
     values = request_of(arguments, Compose, {"timeline": timeline})
+    if arguments.method:
+        yield _double_take(arguments, prior, timeline, resolve_sampling(values, timeline))
+        return
     whole = arguments.loop or not (values.literal or timeline.seconds > reattempts.LONGEST)
     plan = Plan(
         task="compose",
@@ -155,6 +164,28 @@ def _pieces(arguments: Namespace, prior: Prior, timeline: Timeline, missed: list
     for result in results("composing", plan, Models(prior)):
         missed += result.remarks
         yield from result.people
+
+
+def _double_take(arguments: Namespace, prior: Prior, timeline: Timeline, sampling: Sampling) -> Motion:
+    """The timeline's prompts by DoubleTake; each row is longer by what it shares, so that seams are the segments'."""
+    if timeline.asks or timeline.start is not None or arguments.loop or any(s.adapters for s in timeline.segments):
+        fail("--method doubletake makes prompts alone: no goals, path, start, adapters or --loop")
+    laboratory = import_module(DOUBLE_TAKE)
+    names = ("ramp", "soft", "hard", "restart")
+    settings = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
+    handshake = round(prior.fps) if arguments.handshake is None else arguments.handshake
+    features, _ = laboratory.double_take_features(
+        prior,
+        [segment.text for segment in timeline.segments],
+        laboratory.rows_of([round(segment.seconds * prior.fps) for segment in timeline.segments], handshake),
+        mode="published" if arguments.method.endswith("published") else "paper",
+        handshake=handshake,
+        seed=sampling.seed,
+        steps=sampling.steps,
+        guidance=sampling.guidance,
+        **settings,
+    )
+    return finish(prior, features, foot_lock=arguments.foot_lock)
 
 
 def _saved(streams: Sequence[Stream]) -> list[Stream]:

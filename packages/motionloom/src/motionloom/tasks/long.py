@@ -5,7 +5,7 @@ side, and neighbours agree on what they share at every level (`diffusion.stagger
 knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
 together, and a moving window of frames becomes positions and a body.
 
-The published procedure and that of the paper are in `lab.papers.double_take`; docs/decisions/0013 compares them.
+The published procedure is in `lab.papers.double_take`; docs/decisions/0013 compares them.
 """
 
 from collections import deque
@@ -37,7 +37,7 @@ from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
-from motionloom.tasks.text import check_humanml
+from motionloom.tasks.text import check_humanml, placed_positions
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
@@ -176,7 +176,7 @@ def long_features(
     progress: Moves | None = None,
     **settings: Unpack[Settings],
 ) -> Iterator[np.ndarray]:
-    """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
+    """Features (frames, numbers), not standardised, one piece per segment; strung together they are the long motion.
 
     Piece i has ``round(seconds * fps)`` frames, the first and the last one more by ``past``. begin: as of
     `watching.Denoised`. ``batch_size``: rows per network call; it changes speed and memory, not
@@ -199,7 +199,7 @@ def long_features(
         return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
     def poses(pieces: list[np.ndarray]) -> Array:
-        return PlacedMotion(np.concatenate(pieces), place).positions[None]
+        return placed_positions(prior, np.concatenate(pieces), place)[None]
 
     states = sample_chain(
         prior,
@@ -246,7 +246,7 @@ def chain_rows(
         after = overlap // 2 if following or behind is None else len(behind)
         length = before + frames + after
         own = adapted(segment.adapters).for_words(segment.text, *(one.text for one in beside[number : number + 1]))
-        bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
+        bound, null = (_bound(own, text, length, (2 * before, overlap)) for text in (segment.text, ""))
         edits = [holding_correction(past.known, prior, length)] if past and not number and len(past.known) else []
         if behind is not None and not following:
             edits.append(holding_correction(behind, prior, length, last=True))
@@ -262,6 +262,13 @@ def chain_rows(
 
 def _eased_strength(scale: Callable[[int], float], share: np.ndarray, level: int) -> float:
     return float(eased(scale(level), share)[0])
+
+
+def _bound(prior: Prior, text: str, length: int, shared: tuple[int, int]) -> Bound:
+    """The condition of a row; networks with transition flags see the frames it shares with either neighbour."""
+    frames, cond = np.arange(length)[None], prior.condition([text], [length])
+    flags = np.int64((frames < shared[0]) | (frames >= length - shared[1]))
+    return prior.net.bind(cond._replace(flags=flags) if prior.net.config.flags else cond)
 
 
 def load_segment_adapters(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:
@@ -337,11 +344,13 @@ def guided_estimates(
 
 
 def stack_conditions(bounds: list[Bound]) -> Bound:
-    """Rows of several conditions, their words padded to the longest."""
-    most, padded = max(one.words.shape[-1] for one in bounds), []
+    """Rows of several conditions, their words and flags padded to the longest."""
+    most, frames = (max(getattr(one, part).shape[-1] for one in bounds) for part in ("words", "flags"))
+    padded: list[Bound] = []
     for one in bounds:
         keys, values = zero_padded(one.keys, most), zero_padded(one.values, most)
-        padded.append(one._replace(keys=keys, values=values, words=zero_padded(one.words, most, axis=-1)))
+        words, flags = zero_padded(one.words, most, axis=-1), zero_padded(one.flags, frames, axis=-1)
+        padded.append(one._replace(keys=keys, values=values, words=words, flags=flags))
     return Bound._make(map(np.concatenate, zip(*padded, strict=True)))
 
 

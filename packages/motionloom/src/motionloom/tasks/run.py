@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from motionloom.features.layout import WIDTH
 from motionloom.goals.adapters import Applied
 from motionloom.goals.expected import climbs
 from motionloom.goals.goal import Goal
@@ -28,6 +29,7 @@ from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support, add_support_between, is_elevated, lowered, remarks_on_air
+from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import watching
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
@@ -230,6 +232,10 @@ def chain_progress(progress: Progress, steps: int, rows: int) -> Moves:
 def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]:
     assert plan.timeline is not None
     segments, lock = long.load_segment_adapters(models.prior, plan.timeline.segments), plan.values.foot_lock
+    if len(models.prior.mean) != WIDTH and plan.start is None and plan.timeline.path is None and plan.previous is None:
+        moves = chain_progress(progress, plan.sampling.steps, plan.count * len(segments))
+        made = compose_unplaced(models.prior, segments, foot_lock=lock, sampling=plan.sampling, progress=moves)
+        return (Result((motion,)) for motion in made)
     if plan.timeline.path is None and not getattr(plan.values, "literal", True):
         segments = with_goals_read(segments)
     takes = [redraw.Timed(models.prior, segments, plan.timeline.path, one, lock) for one in plan.sampling.each()]

@@ -12,7 +12,9 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import babel, humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
@@ -155,6 +157,13 @@ def joint_positions(prior: Prior, states: np.ndarray) -> np.ndarray:
     if features.shape[-1] == WIDTH:
         return humanml.decode_positions(features)
     return np.stack([finish(prior, row, foot_lock=False).positions() for row in features])
+
+
+def placed_positions(prior: Prior, features: np.ndarray, place: GroundPose) -> np.ndarray:
+    """(frames, 22, 3) metres of features (frames, numbers), not standardised; HumanML3D's begin at ``place``."""
+    if features.shape[1] == WIDTH:
+        return PlacedMotion(features, place).positions
+    return finish(prior, features, foot_lock=False).positions()
 
 
 def to_motion(features: np.ndarray, fps: float, *, foot_lock: bool = True) -> Motion:
