@@ -1,6 +1,7 @@
 """FBX by way of Blender: how it is found, what is said where it is not, and, where it is, the way out and back."""
 
 import os
+import re
 import shlex
 import shutil
 import sys
@@ -132,6 +133,8 @@ def test_a_motion_comes_back_from_an_fbx(tmp_path: Path, installed: Path | None)
     motion = waver()
     with blender.using(installed):
         back = load(save(motion, tmp_path / "wave.fbx"))
+    meshes = re.findall(rb"(\w+)\x00\x01Geometry", (tmp_path / "wave.fbx").read_bytes())
+    assert len(meshes) == 1, "the body, and nothing that Blender's importer adds to draw bones with"
     assert back.fps == pytest.approx(24, rel=1e-3)
     assert len(back) == len(motion)
     places, found = motion.positions(), back.positions()

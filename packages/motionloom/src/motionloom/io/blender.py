@@ -42,6 +42,9 @@ if source.lower().endswith(".fbx"):
                               export_optimize_animation_size=False)
 else:
     bpy.ops.import_scene.gltf(filepath=source)
+    drawn = {bone.custom_shape for thing in bpy.data.objects if thing.pose for bone in thing.pose.bones}
+    for shape in drawn - {None}:  # the importer's ball, which it draws bones with
+        bpy.data.objects.remove(shape)
     ends = [a.frame_range[1] for a in bpy.data.actions] or [1]
     scene.frame_start, scene.frame_end = 0, max(1, round(max(ends)))
     bpy.ops.export_scene.fbx(filepath=target, object_types={"ARMATURE", "MESH", "EMPTY"}, add_leaf_bones=False,

@@ -1,0 +1,1 @@
+"""Files as game engines and other programs play them: docs/engines."""
