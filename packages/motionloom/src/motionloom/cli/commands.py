@@ -1,10 +1,11 @@
 """Which commands there are: those of this package, and how those of others are found."""
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
+from typing import NoReturn
 
 from motionloom.cli.tables import add_family
 from motionloom.reading import read_table
@@ -27,6 +28,8 @@ class Other:
     """Its line in `--help`, which is printed without looking for the package."""
     module: str
     """The module that registers it."""
+    page: str
+    """Its page in the folder of documents."""
 
 
 OTHERS = {name: Other(**row) for name, row in _TABLE["commands"].items()}
@@ -37,11 +40,14 @@ BROUGHT_BY: dict[str, str] = _TABLE["packages"]
 def add_commands(commands: Commands, command: str | None) -> None:
     """Register no more than is needed to know ``command``; where nothing here knows it, all names there are.
 
-    None: all options of all, with those of other packages where these are installed.
-    Raises ModuleNotFoundError where ``command`` belongs to a package that is not.
+    None: all options of all, with those of other packages where these are installed. A ``command`` of a package that is
+    not has its help, and raises ModuleNotFoundError when its words are read.
     """
     if command is not None and command in OTHERS:
-        _registered(command)(commands)
+        try:
+            _registered(command)(commands)
+        except ModuleNotFoundError as error:
+            _add_absent(commands, command, error)
         return
     families = [family for family, names in FAMILIES.items() if command in names] or FAMILIES
     for family in families:
@@ -56,6 +62,23 @@ def add_commands(commands: Commands, command: str | None) -> None:
     if command is not None and command not in commands.choices and not command.startswith("-"):
         for add in _installed(command):
             add(commands)
+
+
+def _add_absent(commands: Commands, name: str, error: ModuleNotFoundError) -> None:
+    """Register a command whose package is not installed: it can say what it is for, and what to install."""
+    reason = absence(error)
+    if reason is None:
+        raise error
+    about = f"What it does: {OTHERS[name].help} (docs/{OTHERS[name].page}); {reason}."
+    parser = commands.add_parser(name, help=OTHERS[name].help, description=about)
+
+    def refuse(args: Sequence[str] = (), namespace: object = None) -> NoReturn:
+        if {"-h", "--help", "--help-all"} & set(args):
+            parser.print_help()
+            parser.exit()
+        raise error
+
+    parser.parse_known_args = refuse  # type: ignore[method-assign, assignment]
 
 
 def _registered(name: str) -> Add:
