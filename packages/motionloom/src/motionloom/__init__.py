@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
-    from motionloom.tasks.duet import compose_pair, react
+    from motionloom.tasks.duet import compose_pair, compose_pair_stream, react
     from motionloom.tasks.edit import Extend, Loop, Redraw, edit
-    from motionloom.tasks.long import compose
+    from motionloom.tasks.long import compose, compose_stream
     from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
@@ -56,9 +56,9 @@ _NAMES = {
     "retarget": "from_smpl22 retarget to_smpl22",
     "skeleton": "SMPL22 Skeleton",
     "tasks.control": "Controlled control",
-    "tasks.duet": "compose_pair react",
+    "tasks.duet": "compose_pair compose_pair_stream react",
     "tasks.edit": "Extend Loop Redraw edit",
-    "tasks.long": "compose",
+    "tasks.long": "compose compose_stream",
     "tasks.pair": "complete_pair generate_pair",
     "tasks.predict": "predict switch",
     "tasks.text": "generate",
@@ -95,6 +95,8 @@ __all__ = [
     "complete_pair",
     "compose",
     "compose_pair",
+    "compose_pair_stream",
+    "compose_stream",
     "control",
     "edit",
     "from_smpl22",
