@@ -103,7 +103,7 @@ def test_a_command_of_an_absent_package_has_help(
         main([name, "--help"])
     assert end.value.code == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert commands.OTHERS[name].help in shown
+    assert commands.OTHERS[name].about in shown
     assert f"pip install '{commands.BROUGHT_BY[package]}'" in shown
     assert main([name, "a person walks", "--out", "x"]) == 2
     assert f"needs {package}" in capsys.readouterr().err

@@ -94,7 +94,7 @@ def _run(argv: Sequence[str] | None) -> int:
     # small products: numpy's own threads would wait on the cores that the networks compute on
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if argv is None else argv)
-    top = parser(COMMANDS.get(words[0], words[0]) if words else None)
+    top = parser(COMMANDS.get(words[0], words[0]) if words else "")
     arguments = top.parse_args(with_command(words, commands_of(top)))
     if arguments.version:
         from importlib.metadata import version
