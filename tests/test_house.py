@@ -107,6 +107,12 @@ def test_public_names_are_documented(name: str) -> None:
         assert (value.__doc__ or "").strip(), f"{name} has no docstring"
 
 
+def test_help_of_the_package_names_every_public_name() -> None:
+    """`help(motionloom)` is the first page that somebody reads in Python."""
+    words = set(re.findall(r"\w+", motionloom.__doc__ or ""))
+    assert not set(motionloom.__all__) - words
+
+
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_sizes_and_docstrings(path: Path) -> None:
     """Functions and files stay readable, and every module with code says what it is."""
