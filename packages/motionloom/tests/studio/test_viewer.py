@@ -20,7 +20,7 @@ from motionloom.retarget import retarget
 from motionloom.viz.notebook import framed
 from motionloom.viz.page import MAX_BYTES, Take, write_page
 from tests.io.rigged import Hero
-from tests.viz.test_notebook import wild
+from tests.tasks.test_edit import person
 from tests.viz.test_page import HOSTILE
 from tests.viz.test_video import standing
 
@@ -149,7 +149,7 @@ def test_a_character_plays_in_its_file(opened, tmp_path: Path) -> None:
 
 def test_a_notebook_plays_it_on_a_click(browser, tmp_path: Path) -> None:
     file = tmp_path / "cell.html"
-    file.write_text(f"<!doctype html><body>{framed(wild(100))}</body>", encoding="utf-8")
+    file.write_text(f"<!doctype html><body>{framed(person(2.0))}</body>", encoding="utf-8")
     page, faults = browser.new_page(), []
     page.on("pageerror", lambda fault: faults.append(fault))
     page.set_default_timeout(PATIENCE)
