@@ -163,21 +163,27 @@ wheel: $(VENV)/.runtime $(PAGE)  ## build a wheel of each package in dist, weigh
 sdist: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.tar.gz: sources, tests, weights and the studio's page
 	$(BIN)/python -c "from setuptools import build_meta; print(build_meta.build_sdist('dist'))"
 
+# A line for each package while pip works; what goes wrong is on stderr, and ends make.
+SHOWN = rm -f $(VENV)/.failed; { $(subst -qq,,$(1)) || touch $(VENV)/.failed; } | \
+    grep --line-buffered -oE '^ *(Collecting|Processing|Installing collected) [^ ]+' | \
+    sed -u -e 's/.*Installing collected .*/  unpacking/' -e 's,^ *[CP][a-z]* \(.*/\)*,  ,'; test ! -e $(VENV)/.failed
+
 # The stamps make a second `make` free; the package is installed in place, so edits of its sources need no reinstall.
 $(VENV)/.runtime: pyproject.toml constraints-runtime.txt
 	@test -n "$(PYTHON)" || { echo "No python3.11 found; say where it is: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11" >&2; exit 2; }
-	@echo "Installing the pinned packages into $(VENV) ..."
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(LOCKED) constraints-runtime.txt
+	@test -x $(BIN)/python || { echo "Creating the environment $(VENV) ..."; $(PYTHON) -m venv $(VENV); }
+	@echo "Installing $$(grep -c == constraints-runtime.txt) pinned packages into $(VENV), which happens once:"
+	@$(call SHOWN,$(LOCKED) constraints-runtime.txt)
+	@echo "Installing motionloom in place ..."
 	@$(PIP) --no-build-isolation -e .
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.runtime packages/motionloom-train/pyproject.toml packages/motionloom-lab/pyproject.toml constraints.txt constraints-cuda.txt constraints-robots.txt
-	@echo "Installing PyTorch and the test tools into $(VENV) (PyTorch is large; this happens once) ..."
+	@echo "Installing PyTorch and the test tools into $(VENV) (PyTorch is large; this happens once):"
 	@# A build of torch that pip is pointed to (find-links), such as one for the CPU, goes before the index's.
 	@sed -n '/^torch==/,/[^\\]$$/p' constraints.txt > $(VENV)/torch.txt
 	@$(LOCKED) $(VENV)/torch.txt --no-index 2>/dev/null || true
-	@$(LOCKED) constraints.txt
+	@$(call SHOWN,$(LOCKED) constraints.txt)
 	@$(LOCKED) constraints-robots.txt
 	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
 	then $(LOCKED) constraints-cuda.txt; fi

@@ -55,8 +55,8 @@ def words(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
         order = random.Random(seed).sample(WORDS, len(WORDS))
         found["live"].append((order, _said(prior, order, seed)))
         segments = [Segment(check(name).prompt, SECONDS) for name in order]
-        blocks = compose(prior, segments, seed=1000 * (seed + 1))
-        found["compose"].append((order, np.concatenate([block.positions() for block in blocks])))
+        motion = compose(prior, segments, seed=1000 * (seed + 1))
+        found["compose"].append((order, motion.positions()))
     result: dict[str, Any] = {"seeds": seeds}
     for kind, sessions in found.items():
         result[kind] = {

@@ -50,7 +50,7 @@ def motion(prior: Prior, asked: dict[str, Any], folder: Path) -> str:
     """The id of a motion of the timeline, kept in a project's folder: its first four blocks, again and again."""
     whole = timeline_from(asked, folder=folder)
     some = len(whole.segments[:4])
-    part = concatenate(*compose(prior, whole.segments[:some], seed=3))
+    part = compose(prior, whole.segments[:some], seed=3)
     made = concatenate(*[part] * (len(whole.segments) // some))
     blocks = Timed(prior, whole.segments, None, Sampling(count=1, seed=3)).blocks
     assert len(made) == sum(block.frames for block in blocks)

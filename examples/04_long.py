@@ -5,7 +5,7 @@ python examples/04_long.py
 
 import numpy as np
 
-from motionloom import Prior, Segment, compose, load
+from motionloom import Prior, Segment, compose_stream, load
 from motionloom.io.stream import open_stream
 
 segments = [
@@ -15,7 +15,7 @@ segments = [
     Segment("a person waves with the right hand", 5.0),
 ]
 with open_stream("long.bvh", total=None) as file:
-    for piece in compose(Prior.load(), segments, seed=1, steps=8):  # 24 steps, the default, look better
+    for piece in compose_stream(Prior.load(), segments, seed=1, steps=8):  # 24 steps, the default, look better
         file.write(piece)
         print(f"{file.seconds:5.2f} s are on the disk")
 

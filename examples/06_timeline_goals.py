@@ -9,7 +9,6 @@ import numpy as np
 
 from motionloom import SMPL22, Prior, compose, save
 from motionloom.goals.timeline import read_timeline
-from motionloom.io.stream import joined
 
 Path("timeline.yaml").write_text("""
 seed: 2
@@ -29,7 +28,7 @@ segments:
     seconds: 2
 """)
 timeline = read_timeline("timeline.yaml")
-motion = joined(list(compose(Prior.load(), timeline.segments, seed=timeline.seed or 0, path=timeline.path, steps=8)))
+motion = compose(Prior.load(), timeline.segments, seed=timeline.seed or 0, path=timeline.path, steps=8)
 save(motion, "timeline.bvh")
 
 assert timeline.path is not None

@@ -19,7 +19,7 @@ goal.positions[30, wrist, 1] = 1.5
 goal.mask[30, wrist, 1] = True
 segments = [Segment("a person walks forward", 3.0, goal=goal), Segment("a person turns around", 3.0)]
 
-made = joined(list(compose(Prior.load(), segments, start=clip, seed=1, steps=8)))
+made = compose(Prior.load(), segments, start=clip, seed=1, steps=8)
 whole = joined([clip, made])
 save(whole, "continued.bvh")
 

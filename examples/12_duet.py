@@ -13,7 +13,6 @@ from motionloom.goals.timeline import read_timeline
 from motionloom.io import save_scene
 from motionloom.tasks.duet import compose_pair, react
 from motionloom.tasks.pair import complete_pair, generate_pair
-from motionloom.tasks.splice import concatenate
 from motionloom.weights.pair import PairBlock
 
 here = Path(__file__).parent
@@ -46,7 +45,6 @@ print(f"led.glb: the first is {100 * off:.1f} cm from the path in the mean")
 assert off < 0.05
 
 timeline = read_timeline(here / "timelines" / "duet.yaml")
-blocks = list(compose_pair(prior, block, timeline.segments, seed=timeline.seed or 0))
-long = [concatenate(*[one[i] for one in blocks]) for i in (0, 1)]
+long = compose_pair(prior, block, timeline.segments, seed=timeline.seed or 0)
 save_scene(long, "long.glb")
 print(f"long.glb: {long[0].seconds:.1f} s of {len(timeline.segments)} prompts")

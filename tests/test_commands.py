@@ -14,7 +14,7 @@ from motionloom.cli import commands
 def test_the_line_in_help_is_the_commands_own(name: str) -> None:
     top = cli.parser(name)
     [action] = [a for a in top._actions if isinstance(a, argparse._SubParsersAction)]
-    assert [a.help for a in action._choices_actions if a.dest == name] == [commands.OTHERS[name].help]
+    assert [a.help for a in action._choices_actions if a.dest == name] == [commands.OTHERS[name].about]
 
 
 def test_help_and_mistakes_list_every_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -206,7 +206,10 @@ def test_the_product_alone_makes_motion_and_names_what_is_missing(wheels: dict[s
     assert (folder / "a.bvh").stat().st_size
     assert "teach" in use(folder, "--help", without=others).stdout
     for command, package in (("teach", "motionloom-train"), ("evaluate", "motionloom-lab")):
-        refused = use(folder, command, "--help", without=others)
+        helped = use(folder, command, "--help", without=others)
+        assert helped.returncode == 0
+        assert package in helped.stdout
+        refused = use(folder, command, "a person walks", "walk.bvh", without=others)
         assert refused.returncode == 2
         assert f"pip install 'packages/{package}'" in refused.stderr
         assert refused.stderr.count("\n") == 1

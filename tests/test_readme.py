@@ -96,13 +96,12 @@ def test_the_timelines_become_motions() -> None:
     """Each timeline of the examples is made, in few steps, to its last frame; what it goes on from and to is met."""
     from motionloom import Prior, compose, load
     from motionloom.goals.timeline import read_timeline
-    from motionloom.io.stream import joined
 
     prior = Prior.load()
     for example in TIMELINES:
         asked = read_timeline(example)
         start = None if asked.start is None else load(asked.start)
-        made = joined(list(compose(prior, asked.segments, path=asked.path, start=start, seed=asked.seed or 0, steps=3)))
+        made = compose(prior, asked.segments, path=asked.path, start=start, seed=asked.seed or 0, steps=3)
         assert len(made) == asked.frames, example.name
         if asked.path is not None:
             apart = (made.root - asked.path.positions[:, 0])[:, [0, 2]]

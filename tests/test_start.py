@@ -69,6 +69,34 @@ def test_a_sentence_becomes_a_bvh_without_what_only_others_need(tmp_path: Path) 
     assert not found & (HEAVY | {"torch", "onnx"})
 
 
+TABLES = {"cli", "errors", "interruption", "reading"}
+FILES = TABLES | {"arrays", "blending", "formats", "ground", "io", "kinematics", "motion", "requests", "retarget"}
+FILES |= {"rotations", "skeleton", "viz"}
+WEIGHTS = FILES - {"kinematics", "viz"} | {"diffusion", "features", "runtime", "weights"}
+SENTENCE = WEIGHTS | FILES - {"viz"} | {"edits", "goals", "tasks"}
+NETWORK = {"numpy", "onnxruntime", "safetensors", "tokenizers"}
+MAY_LOAD: dict[str, tuple[set[str], set[str]]] = {
+    "--help": (TABLES, set()),
+    "generate --help": (TABLES | {"formats", "requests"}, set()),
+    f"info {CLIP}": (FILES, {"numpy"}),
+    f"export {CLIP} OUT": (FILES, {"numpy"}),
+    "weights --json": (WEIGHTS, NETWORK - {"onnxruntime"}),
+    "generate walks --seconds 1 --steps 2 --out OUT": (SENTENCE, NETWORK),
+}
+"""Rooms of the package and libraries that a command may load."""
+
+
+@pytest.mark.parametrize("command", MAY_LOAD, ids=lambda command: command.replace(str(CLIP), "CLIP"))
+def test_a_command_loads_no_more_than_it_needs(command: str, tmp_path: Path) -> None:
+    code = "import sys, contextlib\nbefore = set(sys.modules)\nfrom motionloom.cli import main\n"
+    code += "with contextlib.suppress(SystemExit): main(sys.argv[1:])\nprint('LOADED', *set(sys.modules) - before)"
+    names = loaded(*command.replace("OUT", str(tmp_path / "out.bvh")).split(), code=code)
+    rooms, libraries = MAY_LOAD[command]
+    assert {name.split(".")[1] for name in names if name.startswith("motionloom.")} <= rooms
+    known = {"numpy", "onnxruntime", "safetensors", "tokenizers", "motionloom_lab", "motionloom_train", *HEAVY}
+    assert {name.split(".")[0] for name in names} & known <= libraries
+
+
 def test_importing_the_package_imports_no_library() -> None:
     """`import motionloom` knows its public names and imports what is behind them when they are asked for."""
     found = loaded(code="import sys, motionloom; print('LOADED', *sys.modules)")

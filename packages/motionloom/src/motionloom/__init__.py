@@ -1,13 +1,36 @@
-"""motionloom: human motion from words, with a diffusion model as the prior.
+"""Human motion from words, with a diffusion model as the prior.
 
-from motionloom import Prior, generate, save
-motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1)
-save(motions[0], "walk.bvh")
+    from motionloom import Prior, generate, save
+    [motion] = generate(Prior.load(), "a person walks forward and waves", seed=1)
+    save(motion, "walk.bvh")
 
-`compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips; a
-`Predictor` can `predict` what somebody does next, or `switch` from one clip to another. With a `PairBlock` two people
-come into one world: `generate_pair`, `complete_pair`, `react`, `compose_pair`. `Live` and `LivePair`
-move without end and follow requests meanwhile.
+Values: a `Motion` is a `Skeleton` (`SMPL22` has 22 joints), frames per second, and in each frame the root's place and
+the rotation of every joint. Metres, seconds, radians; right-handed, +Y up, a person faces +Z; quaternions (w, x, y, z).
+
+From words, with a `Prior`:
+    generate            motions of one sentence or several, as a list; `generate_worded` tells what was read and missed
+    compose             one long motion of `Segment`s; `compose_stream` yields it in blocks, for hours
+    control             motions that meet a `Goal`: a path, places of hands, poses; each comes as a `Controlled`
+    edit                a clip changed by `Redraw`, `Extend` or `Loop`
+    Live, LivePair      people who move without end and follow requests meanwhile
+
+Without words, with a `Predictor`:
+    predict, switch     what may come after a clip; a transition from one clip to another. `FixedJoints` of
+                        `FixedPart`s hold parts of what comes
+
+Two people in one world, with a `PairBlock`:
+    generate_pair       both at once; `complete_pair` continues two clips, `react` answers one person's
+    compose_pair        one long duet; `compose_pair_stream` yields it in blocks
+
+Files and bodies:
+    load, save          .bvh, .glb, .npz, films and others, by the suffix
+    retarget            a motion onto another skeleton; `to_smpl22` and `from_smpl22` by way of the 22 joints
+    measure_deeds       what a motion does (`Deeds`): steps, turns, waves
+    batch, read_batch   motions of many rows into a folder, and what such a folder holds
+
+`Sampling`, `PairSampling` and `PredictionSampling` hold seed, steps, guidance and the like; their fields are keywords
+of the functions above too. `save_prior` and `save_predictor` write weight files. What a caller got wrong raises
+`MotionloomError` with one sentence. `help(motionloom.generate)` and the like list the arguments.
 """
 
 from importlib import import_module
@@ -29,9 +52,9 @@ if TYPE_CHECKING:
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
-    from motionloom.tasks.duet import compose_pair, react
+    from motionloom.tasks.duet import compose_pair, compose_pair_stream, react
     from motionloom.tasks.edit import Extend, Loop, Redraw, edit
-    from motionloom.tasks.long import compose
+    from motionloom.tasks.long import compose, compose_stream
     from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
@@ -56,9 +79,9 @@ _NAMES = {
     "retarget": "from_smpl22 retarget to_smpl22",
     "skeleton": "SMPL22 Skeleton",
     "tasks.control": "Controlled control",
-    "tasks.duet": "compose_pair react",
+    "tasks.duet": "compose_pair compose_pair_stream react",
     "tasks.edit": "Extend Loop Redraw edit",
-    "tasks.long": "compose",
+    "tasks.long": "compose compose_stream",
     "tasks.pair": "complete_pair generate_pair",
     "tasks.predict": "predict switch",
     "tasks.text": "generate",
@@ -95,6 +118,8 @@ __all__ = [
     "complete_pair",
     "compose",
     "compose_pair",
+    "compose_pair_stream",
+    "compose_stream",
     "control",
     "edit",
     "from_smpl22",

@@ -72,8 +72,8 @@ class Motion:
         )
 
     def _repr_html_(self) -> str:
-        """What a notebook shows of the motion: the viewer, in a frame (`motionloom.viz.page.framed`)."""
-        return import_module("motionloom.viz.page").framed(self)
+        """What a notebook shows of the motion: a poster, and a player on a click (`motionloom.viz.notebook.framed`)."""
+        return import_module("motionloom.viz.notebook").framed(self)
 
     def world_rotations(self) -> Array:
         """(frames, joints, 4): world_from_joint."""

@@ -10,7 +10,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Mapping
-from importlib import resources
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -123,5 +123,6 @@ def read_json(path: Path | str, what: str) -> Any:
 
 def read_table(package: str, file: str) -> Any:
     """The content of a .toml or .json file that ships in a package, such as ``motionloom.cli``."""
-    text = (resources.files(package) / file).read_text(encoding="utf-8")
+    place = import_module(package).__file__  # not by importlib.resources, which imports for as long as `--help` takes
+    text = Path(str(place)).with_name(file).read_text(encoding="utf-8")
     return json.loads(text) if file.endswith(".json") else tomllib.loads(text)

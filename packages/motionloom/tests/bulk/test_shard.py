@@ -413,7 +413,6 @@ def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: P
     """The same as `generate`, `control` and `compose` of the same seeds make."""
     from motionloom import Segment, compose, control, generate
     from motionloom.goals.goal_file import read_goal
-    from motionloom.io.stream import joined
 
     goal = {"path": {"points": [[0, 0], [0, 0.5]]}}
     (folder / "a.yaml").write_text(TIMELINE)
@@ -429,7 +428,7 @@ def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: P
     single = [
         generate(prior, "a person walks", seconds=1.0, seed=3, steps=2, literal=True)[0],
         control(prior, "a person walks", read, seed=3, steps=2)[0].motion,
-        joined(list(compose(prior, segments, seed=3, steps=2))),
+        compose(prior, segments, seed=3, steps=2),
         generate(prior, "turn left 90 degrees", seed=3, steps=2)[0],
     ]
     assert [one.about["keeps"] is None for one in results()] == [True, True, True, False]

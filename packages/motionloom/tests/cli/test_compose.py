@@ -30,7 +30,7 @@ def call(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the command asked of the maker of motion, which walks 1 m a second along +Z and stops where it is told."""
     record: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def compose(prior, segments, *, sampling, start, path, foot_lock, progress):
+    def compose_stream(prior, segments, *, sampling, start, path, foot_lock, progress):
         record.update(segments=segments, start=start, path=path, foot_lock=foot_lock)
         record.update(seed=sampling.seed, guidance=sampling.guidance, steps=sampling.steps)
         at = 0
@@ -44,7 +44,7 @@ def call(monkeypatch: pytest.MonkeyPatch) -> dict:
             progress(sampling.steps)
             yield Motion(SMPL22, 20.0, root, np.tile(IDENTITY, (frames, 22, 1)))
 
-    monkeypatch.setattr(long, "compose", compose, raising=False)
+    monkeypatch.setattr(long, "compose_stream", compose_stream)
     return record
 
 

@@ -40,7 +40,6 @@ from motionloom.tasks.edit import edit
 from motionloom.tasks.long import compose
 from motionloom.tasks.pair import generate_pair, person_seeds
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import generate
 from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
@@ -298,9 +297,8 @@ def test_rows_of_a_chain_are_chosen_one_by_one(monkeypatch: pytest.MonkeyPatch) 
     segments = plain_timeline(["two people hug", "two people shake hands"], seconds=1.5).segments
 
     def both(best_of: int) -> list[Motion]:
-        one = concatenate(*compose(prior, segments, seed=SEED, steps=4, best_of=best_of))
-        duets = list(compose_pair(prior, pair, segments, seed=SEED, steps=4, best_of=best_of))
-        return [one, *(concatenate(*[duet[i] for duet in duets]) for i in (0, 1))]
+        one = compose(prior, segments, seed=SEED, steps=4, best_of=best_of)
+        return [one, *compose_pair(prior, pair, segments, seed=SEED, steps=4, best_of=best_of)]
 
     several = both(2)
     monkeypatch.setattr("motionloom.tasks.sampling.candidate_seeds", lambda seed, count: [candidate_seeds(seed, 2)[1]])

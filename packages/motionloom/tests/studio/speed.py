@@ -118,7 +118,7 @@ def sampling(rounds: int) -> dict[str, float]:
     goal = read_goal({"path": {"points": [[p["x"], p["z"]] for p in PATH["points"]]}}, frames=200, folder=Path())
 
     def composed() -> None:
-        list(compose(prior, [Segment("a person walks", 10.0)], seed=3, path=goal))
+        compose(prior, [Segment("a person walks", 10.0)], seed=3, path=goal)
 
     def generated() -> None:
         generate(prior, "a person walks", seconds=10.0, seed=3)

@@ -17,8 +17,10 @@ from motionloom.io import save
 from motionloom.io.character import load_character
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.viz.page import MAX_BYTES, Take, framed, write_page
+from motionloom.viz.notebook import framed
+from motionloom.viz.page import MAX_BYTES, Take, write_page
 from tests.io.rigged import Hero
+from tests.tasks.test_edit import person
 from tests.viz.test_page import HOSTILE
 from tests.viz.test_video import standing
 
@@ -145,14 +147,29 @@ def test_a_character_plays_in_its_file(opened, tmp_path: Path) -> None:
     assert {one for one in shown.asked if not one.startswith(("blob:", "data:"))} == {shown.address}
 
 
-def test_a_notebooks_frame_shows_it(opened, tmp_path: Path) -> None:
+def test_a_notebook_plays_it_on_a_click(browser, tmp_path: Path) -> None:
     file = tmp_path / "cell.html"
-    file.write_text(f"<!doctype html><body data-ready=true>{framed(standing(40))}</body>", encoding="utf-8")
-    shown = opened(file)
-    inside = shown.page.frame_locator("iframe")
-    inside.locator("body[data-ready]").wait_for()
-    assert inside.locator(".clock").inner_text().endswith(" / 2.00 s")  # it plays at once
-    assert not shown.faults
+    file.write_text(f"<!doctype html><body>{framed(person(2.0))}</body>", encoding="utf-8")
+    page, faults = browser.new_page(), []
+    page.on("pageerror", lambda fault: faults.append(fault))
+    page.set_default_timeout(PATIENCE)
+    try:
+        page.goto(file.as_uri())
+        inside = page.frame_locator("iframe")
+        assert not inside.locator("#stage").is_visible()
+        inside.get_by_role("button", name="Play").click()
+        stage = inside.locator("#stage")
+        stage.wait_for()
+        page.wait_for_timeout(200)
+        pictures = []
+        for _ in range(2):
+            pictures.append(np.asarray(Image.open(io.BytesIO(stage.screenshot())).convert("RGB")).astype(int))
+            page.wait_for_timeout(300)
+        assert (pictures[0] < 100).any(axis=-1).mean() > 0.001
+        assert differ(*pictures) > 0.0005
+        assert not faults
+    finally:
+        page.close()
 
 
 def test_the_web_component_plays_a_file(browser, tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def _chain(prior: Prior, found: Numbers, name: str, chain: Sequence[tuple[str, f
     segments = [Segment(text, seconds) for text, seconds in chain]
     pieces = list(long_features(prior, segments, sampling=Sampling(seed=4)))
     found.add(f"{name}.features", np.concatenate(pieces))
-    [motion] = compose(prior, segments, sampling=Sampling(seed=4))
+    motion = compose(prior, segments, sampling=Sampling(seed=4))
     found.motion(name, motion)
 
 

@@ -98,7 +98,7 @@ def test_in_node_it_draws_what_python_draws(app: Path, prior: Prior, tmp_path: P
     assert np.abs(back.root - motion.root).max() < 0.05
     segments = [Segment(one, seconds) for one, seconds in chain]
     features = np.concatenate(list(long_features(prior, segments, sampling=Sampling(seed=4))))
-    [motion] = compose(prior, segments, sampling=Sampling(seed=4))
+    motion = compose(prior, segments, sampling=Sampling(seed=4))
     alike(tmp_path, 1, features, motion, std)
     goal = root_path(numbers.PATH, frames=100)
     [features] = steered_features(prior, ["a person walks"], goal.relative_to(start_of(goal)), seeds=[4])

@@ -11,14 +11,13 @@ from motionloom.features.pair import PairMotion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
-from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.runtime.pair import PairSession, join
 from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import duet as tasks
-from motionloom.tasks.duet import compose_pair, duet_features, react
-from motionloom.tasks.splice import concatenate, person_at_20
+from motionloom.tasks.duet import compose_pair, compose_pair_stream, duet_features, react
+from motionloom.tasks.splice import person_at_20
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.noise import normal
@@ -41,10 +40,6 @@ def prior() -> Prior:
 @pytest.fixture(scope="module")
 def block(prior: Prior) -> PairBlock:
     return block_of(prior)
-
-
-def whole(blocks: list[tuple[Motion, Motion]]) -> list[Motion]:
-    return [concatenate(*[one[i] for one in blocks]) for i in (0, 1)]
 
 
 # Somebody is given
@@ -96,7 +91,7 @@ def test_motions_that_nobody_can_react_to_are_refused(prior: Prior, block: PairB
 
 
 def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, block: PairBlock) -> None:
-    duet = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, foot_lock=False)))
+    duet = compose_pair(prior, block, SEGMENTS, seed=1, steps=4, foot_lock=False)
     for motion in duet:
         assert len(motion) == 20 + 16 + 18
         steps = np.linalg.norm(np.diff(motion.root, axis=0), axis=-1)
@@ -263,16 +258,16 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
     path.mask[:, 0] = [True, False, True]
-    duet = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)))
+    duet = compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)
     off = np.linalg.norm((duet[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
     assert off.mean() < 0.03
     assert abs(heading(duet[1].positions()[:1])[0] - np.pi / 2) < 0.5
     other = replace(path, positions=path.positions + np.array([0.0, 0.0, 1.0]))
-    duet = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, other=other, steps=3, foot_lock=False)))
+    duet = compose_pair(prior, block, SEGMENTS, path=path, person=1, other=other, steps=3, foot_lock=False)
     for one, goal in zip(duet, (other, path), strict=True):
         assert np.linalg.norm((one.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() < 0.03
     with pytest.raises(MotionloomError, match="give both"):
-        list(compose_pair(prior, block, SEGMENTS, other=other, steps=3))
+        compose_pair(prior, block, SEGMENTS, other=other, steps=3)
 
 
 def test_guesses_go_where_their_person_is_asked_to_be(
@@ -298,13 +293,22 @@ def test_guesses_go_where_their_person_is_asked_to_be(
     assert second == pytest.approx(0.3, abs=0.05)
 
 
+def test_a_long_duet_is_the_blocks_of_its_stream(prior: Prior, block: PairBlock) -> None:
+    blocks = list(compose_pair_stream(prior, block, [Segment("two people hug", 9.0)] * 2, seed=3, steps=1))
+    duet = compose_pair(prior, block, [Segment("two people hug", 9.0)] * 2, seed=3, steps=1)
+    assert len(blocks) > 1
+    for motion, pieces in zip(duet, zip(*blocks, strict=True), strict=True):
+        np.testing.assert_array_equal(motion.root, np.concatenate([piece.root for piece in pieces]))
+        np.testing.assert_array_equal(motion.rotations, np.concatenate([piece.rotations for piece in pieces]))
+
+
 def test_nothing_is_composed_of_nothing(prior: Prior, block: PairBlock) -> None:
     for segments, message in (([], "no segment"), ([Segment("a :: b :: c", 2)], "around one ::")):
         with pytest.raises(MotionloomError, match=message):
-            list(compose_pair(prior, block, segments))
+            compose_pair(prior, block, segments)
 
 
 @pytest.mark.parametrize("share", [-0.1, 8, float("nan")])
 def test_nobody_is_kept_together_by_more_than_wholly(prior: Prior, block: PairBlock, share: float) -> None:
     with pytest.raises(MotionloomError, match="pair_guidance must be 0 to 1"):
-        list(compose_pair(prior, block, SEGMENTS, pair_guidance=share))
+        compose_pair(prior, block, SEGMENTS, pair_guidance=share)

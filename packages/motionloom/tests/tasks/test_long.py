@@ -17,7 +17,7 @@ from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.runtime.prior import PriorSession
-from motionloom.tasks.long import Past, compose, compose_takes, long_features
+from motionloom.tasks.long import Past, compose, compose_stream, compose_takes, long_features
 from motionloom.tasks.splice import move_rigidly
 from motionloom.tasks.text import sample_features
 from motionloom.tasks.unplaced import compose_unplaced
@@ -44,7 +44,7 @@ def features(prior: Prior, segments, **more) -> list[np.ndarray]:
 
 
 def whole(prior: Prior, segments, **more) -> Motion:
-    blocks = list(compose(prior, segments, **{"steps": 3, **more}))
+    blocks = list(compose_stream(prior, segments, **{"steps": 3, **more}))
     return replace(
         blocks[0],
         root=np.concatenate([block.root for block in blocks]),
@@ -67,6 +67,16 @@ def test_frames_are_the_sum_of_the_segments_rounded(prior: Prior) -> None:
         assert [len(piece) for piece in features(prior, segments, steps=1)] == frames
         motion = whole(prior, segments, steps=1)
         assert (len(motion), motion.fps) == (sum(frames), 20)
+
+
+def test_a_long_motion_is_the_blocks_of_its_stream(prior: Prior) -> None:
+    segments = [Segment(WALK, 9.0), Segment(TURN, 9.0)]
+    motion, joined = compose(prior, segments, seed=3, steps=1), whole(prior, segments, seed=3, steps=1)
+    assert len(list(compose_stream(prior, segments, steps=1))) > 1
+    np.testing.assert_array_equal(motion.root, joined.root)
+    np.testing.assert_array_equal(motion.rotations, joined.rotations)
+    with pytest.raises(MotionloomError, match="there is no segment"):
+        compose(prior, [])
 
 
 def test_company_and_patch_do_not_matter(prior: Prior) -> None:
@@ -170,7 +180,7 @@ def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(pri
         finally:
             read.append("closed")
 
-    blocks = compose(prior, endless(), steps=1, batch_size=2)
+    blocks = compose_stream(prior, endless(), steps=1, batch_size=2)
     assert not read
     block = next(blocks)
     assert len(block) > 0
@@ -252,7 +262,7 @@ def test_a_second_of_a_past_is_seen() -> None:
 )
 def test_what_cannot_be_asked_is_reported(prior: Prior, seconds: list[float], options: dict, sentence: str) -> None:
     with pytest.raises(MotionloomError, match=sentence) as caught:
-        list(compose(prior, [Segment(WALK, s) for s in seconds], **{"steps": 1, **options}))
+        compose(prior, [Segment(WALK, s) for s in seconds], **{"steps": 1, **options})
     assert "\n" not in str(caught.value)
 
 

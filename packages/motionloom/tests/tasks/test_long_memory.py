@@ -15,7 +15,7 @@ from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import body
 from motionloom.tasks.body import Places
-from motionloom.tasks.long import compose
+from motionloom.tasks.long import compose_stream
 from motionloom.weights.prior import Card, Prior
 
 SEGMENTS, SECONDS = 720, 5.0
@@ -77,7 +77,7 @@ def test_an_hour_of_720_segments_runs_in_constant_memory(prior: Prior) -> None:
     frames, third, sizes = 0, SEGMENTS * SECONDS * 20 / 3, []
     tracemalloc.start()
     try:
-        for number, piece in enumerate(compose(prior, segments(), steps=2)):
+        for number, piece in enumerate(compose_stream(prior, segments(), steps=2)):
             frames += len(piece)
             if number % 4 == 0:  # rows come out in bunches: what is alive goes up and down with them
                 ahead = count - frames / (20 * SECONDS)  # segments are read as the walk gets there

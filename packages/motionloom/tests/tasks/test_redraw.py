@@ -15,7 +15,6 @@ from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Block, Run, Timed, blocks_from, changed_runs, resample_runs
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny
@@ -39,7 +38,7 @@ def timed(prior: Prior, segments, path: Goal | None = None, **settings: Any) -> 
 
 
 def sampled(timeline: Timed) -> Motion:
-    return concatenate(*compose(timeline.prior, timeline.segments, path=timeline.path, sampling=timeline.sampling))
+    return compose(timeline.prior, timeline.segments, path=timeline.path, sampling=timeline.sampling)
 
 
 def changed(before: Timed, after: Timed, old: Motion | None = None) -> tuple[Motion, Motion, list[int]]:

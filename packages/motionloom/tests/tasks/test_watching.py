@@ -6,7 +6,6 @@ import pytest
 from motionloom import Predictor, Prior, Redraw, Segment, compose, edit, generate, predict
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.pair import generate_pair
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.pair import PairBlock
 
@@ -44,7 +43,7 @@ def test_nothing_is_reported_outside_of_the_block(prior: Prior) -> None:
 def test_a_long_motion_is_shown_from_end_to_end(prior: Prior) -> None:
     reports: list[Denoised] = []
     with watching(reports.append):
-        motion = concatenate(*compose(prior, [Segment("a person walks", 2.0), Segment("a person jumps", 1.5)], steps=6))
+        motion = compose(prior, [Segment("a person walks", 2.0), Segment("a person jumps", 1.5)], steps=6)
     assert [one.move for one in reports] == list(range(1, 7))
     poses = reports[-1].positions()
     assert poses.shape == (1, 1, 70, 22, 3)
@@ -89,14 +88,12 @@ def test_a_long_duet_is_shown_from_end_to_end_in_one_world(prior: Prior) -> None
     reports: list[Denoised] = []
     segments = [Segment("two people dance", 1.5), Segment("two people shake hands", 1.5)]
     with watching(reports.append):
-        pieces = list(compose_pair(prior, PairBlock.load("duet", prior), segments, steps=6))
+        duet = compose_pair(prior, PairBlock.load("duet", prior), segments, steps=6)
     poses = reports[-1].positions()
     assert [one.move for one in reports] == list(range(1, 7))
     assert poses.shape == (1, 2, 60, 22, 3)
-    for person, blocks in zip(
-        poses[0], zip(*pieces, strict=True), strict=True
-    ):  # 6 steps: hands are still on their way
-        assert np.linalg.norm(person - concatenate(*blocks).positions(), axis=-1).mean() < 0.2
+    for person, motion in zip(poses[0], duet, strict=True):  # 6 steps: hands are still on their way
+        assert np.linalg.norm(person - motion.positions(), axis=-1).mean() < 0.2
 
 
 def test_an_exception_of_the_callback_ends_the_drawing_at_that_network_call(prior: Prior) -> None:

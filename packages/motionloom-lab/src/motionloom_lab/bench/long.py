@@ -12,7 +12,7 @@ from motionloom.diffusion import Denoiser, lerp, levels, row_noise
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.io.stream import open_stream
 from motionloom.runtime.prior_condition import Bound
-from motionloom.tasks.long import BATCH, compose
+from motionloom.tasks.long import BATCH, compose_stream
 from motionloom.tasks.text import SOLVER, SPACING
 from motionloom.weights.prior import Prior
 from motionloom_lab.bench.speed import Entry, Process, Sampling, fit, process, timed
@@ -150,7 +150,7 @@ def _making(prior: Prior, how: Sampling, texts: Sequence[str], each: float, out:
 
     def make() -> None:
         with open_stream(out, total=len(texts) * round(each * prior.fps), fps=prior.fps) as file:
-            for piece in compose(prior, segments, guidance=how.guidance, steps=how.steps):
+            for piece in compose_stream(prior, segments, guidance=how.guidance, steps=how.steps):
                 file.write(piece)
 
     return make

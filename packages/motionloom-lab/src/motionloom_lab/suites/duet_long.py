@@ -12,7 +12,6 @@ from motionloom.motion import Motion
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose
 from motionloom.tasks.people import Duet
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -63,13 +62,9 @@ def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: LongDuetS
     """`compose_pair` of captions in turn, from the requested one."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        duets = []
-        for number in range(count):
-            pieces = list(
-                compose_pair(prior, block, timeline(captions, caption, how), seed=own_seed(seed, number), **how.drawing)
-            )
-            duets.append((concatenate(*(a for a, _ in pieces)), concatenate(*(b for _, b in pieces))))
-        return duets
+        segments = timeline(captions, caption, how)
+        seeds = [own_seed(seed, number) for number in range(count)]
+        return [compose_pair(prior, block, segments, seed=own, **how.drawing) for own in seeds]
 
     return make
 
@@ -79,7 +74,7 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: Lon
     begun = judged.beginnings(pairs, how)
 
     def one(caption: str, seed: int) -> Motion:
-        return concatenate(*compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing))
+        return compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         duets = []

@@ -107,8 +107,8 @@ def _ours(request: Request) -> Long:
 
 def _exported(request: Request) -> Long:
     """What a user gets: constant bones, planted feet held still."""
-    blocks = compose(request.prior, request.segments, seed=request.seed, **request.how.drawing)
-    return from_positions(np.concatenate([block.positions() for block in blocks]))
+    motion = compose(request.prior, request.segments, seed=request.seed, **request.how.drawing)
+    return from_positions(motion.positions())
 
 
 def _double_take(

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.cli.commands import absence, add_commands
+from motionloom.cli.help import HelpAll, help_of
 from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
 from motionloom.cli.terminal import escaping, say
 from motionloom.errors import MotionloomError, one_line
@@ -20,6 +21,11 @@ from motionloom.interruption import interruptible, was_interrupted
 class _Parser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **({"allow_abbrev": False} | more))  # --out must never mean --out-unit
+        self.add_argument("--help-all", action=HelpAll, help=argparse.SUPPRESS)
+
+    def format_help(self) -> str:
+        """The options in groups, where there are many."""
+        return help_of(self)
 
     def error(self, message: str) -> None:  # type: ignore[override]
         """One sentence and exit code 2, without the page of usage."""
@@ -88,7 +94,7 @@ def _run(argv: Sequence[str] | None) -> int:
     # small products: numpy's own threads would wait on the cores that the networks compute on
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if argv is None else argv)
-    top = parser(COMMANDS.get(words[0], words[0]) if words else None)
+    top = parser(COMMANDS.get(words[0], words[0]) if words else "")
     arguments = top.parse_args(with_command(words, commands_of(top)))
     if arguments.version:
         from importlib.metadata import version

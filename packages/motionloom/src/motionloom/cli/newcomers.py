@@ -1,7 +1,6 @@
 """What people type who have not read the help: other names of commands and options, sentences without quotes."""
 
 import argparse
-import difflib
 from collections.abc import Iterable, Sequence
 
 from motionloom.cli.terminal import note
@@ -31,7 +30,7 @@ def with_command(words: Sequence[str], commands: Iterable[str]) -> list[str]:
         return words
     if words[0] in COMMANDS:
         return [COMMANDS[words[0]], *words[1:]]
-    close = difflib.get_close_matches(words[0].lower(), [*known, *COMMANDS], n=1, cutoff=0.7)
+    close = _close(words[0].lower(), [*known, *COMMANDS], 0.7)
     if close and " " not in words[0]:
         line = " ".join([COMMANDS.get(close[0], close[0]), *words[1:]])
         raise MotionloomError(f"there is no command {words[0]!r}; did you mean: motionloom {line}")
@@ -39,6 +38,12 @@ def with_command(words: Sequence[str], commands: Iterable[str]) -> list[str]:
     if " " in sentence:
         raise MotionloomError(f'a command comes first; did you mean: motionloom generate "{sentence}"')
     raise MotionloomError(f"there is no command {words[0]!r}; the commands are {', '.join(known)}")
+
+
+def _close(word: str, known: Sequence[str], cutoff: float) -> list[str]:
+    import difflib  # here, since whoever makes no mistake need not wait for it
+
+    return difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
 
 
 def with_options(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
@@ -76,7 +81,7 @@ def suggestion(parser: argparse.ArgumentParser, words: Sequence[str]) -> str:
         name = word.partition("=")[0]
         if name in _SEVERAL and set(_SEVERAL[name]) & known:
             return f", did you mean {' or '.join(n for n in _SEVERAL[name] if n in known)}?"
-        if name.startswith("-") and (close := difflib.get_close_matches(name, sorted(names), n=1, cutoff=0.6)):
+        if name.startswith("-") and (close := _close(name, sorted(names), 0.6)):
             return f", did you mean {names[close[0]]}?"
     return ""
 

@@ -1,8 +1,9 @@
 """Commands as tables list them: ``duet.toml`` beside ``duet.py`` has the help, the options and the function of `duet`.
 
-A command has ``help``, ``description``, ``run`` (a function of the module), and ``options``; or ``commands`` below it.
-``defaults`` are further values, ``unset`` names options that are None unless they are typed, and ``like`` another
-command that it is the same as otherwise. Each of its ``options`` is one of these:
+A command has ``help`` (those of this package are in `commands.toml`), ``description``, ``run`` (a function of the
+module), and ``options``; or ``commands`` below it. ``defaults`` are further values, ``unset`` names options that are
+None unless they are typed, and ``like`` another command that it is the same as otherwise. Each of its ``options`` is
+one of these:
 
 * ``react-to``, the name of a row, in the command's table ``own`` or in ``shared.toml``;
 * ``@reading``, a group of ``shared.toml``;
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from motionloom.cli.newcomers import option_names, take_text_anywhere
@@ -62,10 +64,14 @@ class Option:
         return Option(**{"name": name, "dest": name.replace("-", "_"), **row, **tuples})
 
 
-def add_family(commands: Any, module: str) -> None:
-    """Register the commands of the table beside a module, which is imported when one of them runs."""
+def add_family(commands: Any, module: str, helps: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Register the commands of the table beside a module, which is imported when one of them runs.
+
+    helps: the lines in `--help` of commands whose rows have none.
+    """
     package, _, name = module.rpartition(".")
-    _add_commands(commands, read_table(package, f"{name}.toml"), module, {})
+    rows = {name: {"help": helps.get(name)} | row for name, row in read_table(package, f"{name}.toml").items()}
+    _add_commands(commands, rows, module, {})
 
 
 def _add_commands(commands: Any, rows: Table, module: str, above: Table) -> None:

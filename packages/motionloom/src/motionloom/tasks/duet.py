@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from itertools import chain, tee
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,7 @@ from motionloom.tasks.pair import (
 )
 from motionloom.tasks.people import Duet, Partner
 from motionloom.tasks.sampling import Moves, Progress, sample_chain
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -120,18 +121,44 @@ def compose_pair(
     sampling: PairSampling | None = None,
     progress: Moves | None = None,
     **settings: Unpack[PairSettings],
+) -> Duet:
+    """One long duet; the arguments and errors are those of `compose_pair_stream`, which yields the same in blocks."""
+    chosen = PairSampling.of(sampling, settings)
+    more: dict[str, Any] = {
+        "path": path,
+        "person": person,
+        "other": other,
+        "foot_lock": foot_lock,
+        "progress": progress,
+    }
+    first, second = zip(*compose_pair_stream(prior, block, segments, sampling=chosen, **more), strict=True)
+    return concatenate(*first), concatenate(*second)
+
+
+def compose_pair_stream(
+    prior: Prior,
+    block: PairBlock,
+    segments: Sequence[Segment],
+    *,
+    path: Goal | None = None,
+    person: int = 0,
+    other: Goal | None = None,
+    foot_lock: bool = True,
+    sampling: PairSampling | None = None,
+    progress: Moves | None = None,
+    **settings: Unpack[PairSettings],
 ) -> Iterator[Duet]:
     """One long duet, block after block in one world, as it is sampled; in memory that does not grow with its length.
 
     Args:
-        segments: as of `long.compose`; a text with "::" in it says what the first and what the second person does. In
-            all there are ``round(seconds * 20)`` frames of each.
+        segments: as of `long.compose_stream`; a text with "::" in it says what the first and what the second person
+            does. In all there are ``round(seconds * 20)`` frames of each.
         path: where ``person`` is on the ground in every frame of the whole, in the world; goals of segments are that
             person's too. The first person starts at the origin facing +Z, or ``person`` where the path begins.
         person: 0 or 1; whoever has a goal is not moved by pair guidance.
         other: a path as ``path``, of the other person; goes with one.
         foot_lock: keep planted feet still.
-        sampling, progress: as of `long.compose`, with `PairSampling`.
+        sampling, progress: as of `long.compose_stream`, with `PairSampling`.
 
     Raises:
         MotionloomError: for an impossible request.

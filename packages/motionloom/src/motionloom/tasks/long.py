@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,29 @@ class Row:
 
 def compose(
     prior: Prior,
+    segments: Sequence[Segment],
+    *,
+    start: Motion | None = None,
+    path: Goal | None = None,
+    foot_lock: bool = True,
+    sampling: Sampling | None = None,
+    progress: Moves | None = None,
+    **settings: Unpack[Settings],
+) -> Motion:
+    """One long motion of the 22-joint person.
+
+    The arguments and errors are those of `compose_stream`, which yields the same motion in blocks; here there must be
+    a segment, and an end of them.
+    """
+    if not segments:
+        raise MotionloomError("there is no segment; say what the person does, one after the other")
+    chosen = Sampling.of(sampling, settings)
+    more: Any = {"start": start, "path": path, "foot_lock": foot_lock, "progress": progress}
+    return concatenate(*compose_stream(prior, segments, sampling=chosen, **more))
+
+
+def compose_stream(
+    prior: Prior,
     segments: Iterable[Segment],
     *,
     start: Motion | None = None,
@@ -97,6 +120,8 @@ def compose(
     **settings: Unpack[Settings],
 ) -> Iterator[Motion]:
     """One long motion of the 22-joint person, block after block in one world, as it is sampled.
+
+    For motions of hours: a block has up to 300 frames, and is yielded when it is finished.
 
     Args:
         prior: weights that make HumanML3D's 263 numbers at 20 frames per second.

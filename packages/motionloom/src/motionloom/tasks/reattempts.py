@@ -19,7 +19,6 @@ from motionloom.requests.sampling import LARGEST_SEED
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Run, Timed, resample_runs
 from motionloom.tasks.sampling import Moves
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import watching
 
 ATTEMPTS = 4
@@ -122,7 +121,6 @@ def _sample_again(
     seed = attempt_seed(timed.sampling.seeds(1)[0] + i, number)
     if len(segments) == 1:
         own = replace(timed.sampling, seed=seed, first=0, count=1)
-        pieces = compose(timed.prior, segments, start=start, foot_lock=timed.foot_lock, sampling=own, progress=progress)
-        return concatenate(*pieces)
+        return compose(timed.prior, segments, start=start, foot_lock=timed.foot_lock, sampling=own, progress=progress)
     again = replace(timed, segments=segments)
     return resample_runs(again, motion, timed.blocks, [Run(i, i + 1, i, i + 1)], progress, seed=seed)

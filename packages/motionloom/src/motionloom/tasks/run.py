@@ -27,7 +27,6 @@ from motionloom.skeleton import SMPL22
 from motionloom.tasks import control, duet, edit, long, pair, predict, reattempts, redraw, text, worded
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support, add_support_between, is_elevated, lowered, remarks_on_air
 from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import watching
@@ -252,7 +251,7 @@ def _compose(plan: Plan, models: Models, progress: Progress) -> Iterator[Result]
         spans = redraw.sampled_frames(takes[0], plan.previous[1], runs)
         result = _held_to_words(plan, takes[0], motion, progress, changed, spans)
         return iter([replace(result, measures={"redrawn": changed})])
-    motions = (long.compose if plan.in_pieces else long.compose_takes)(
+    motions = (long.compose_stream if plan.in_pieces else long.compose_takes)(
         models.prior,
         segments,
         start=plan.start,
@@ -387,8 +386,7 @@ def _duet(plan: Plan, models: Models, progress: Progress) -> Iterable[Result]:
         moved = chain_progress(progress, plan.sampling.steps, len(segments))
         person = values.person
         paths = {"path": plan.timeline.path, "person": person, "other": plan.goals[1 - person]}
-        blocks = duet.compose_pair(prior, block, segments, **paths, progress=moved, **how)
-        duets = [tuple(concatenate(*one) for one in zip(*blocks, strict=True))]
+        duets = [duet.compose_pair(prior, block, segments, **paths, progress=moved, **how)]
     elif len(plan.people) == 2:
         first, second = plan.people
         duets = pair.complete_pair(

@@ -60,7 +60,7 @@ _callback: ContextVar[OnDenoised | None] = ContextVar("motionloom_on_denoised", 
 def watching(on_denoised: OnDenoised) -> Iterator[None]:
     """Call ``on_denoised`` after each network call of whatever is sampled inside the block, in the same thread.
 
-    Generators (`compose`, `compose_pair`) sample while they are read: read them inside the block.
+    Generators (`compose_stream`, `compose_pair_stream`) sample while they are read: read them inside the block.
     """
     token = _callback.set(on_denoised)
     try:

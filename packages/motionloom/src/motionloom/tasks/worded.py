@@ -38,7 +38,6 @@ from motionloom.tasks.reattempts import ATTEMPTS, PLAINER_FROM, attempt_seed, re
 from motionloom.tasks.redraw import Timed
 from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.sampling import Progress
-from motionloom.tasks.splice import concatenate
 from motionloom.tasks.supported import add_support, lowered
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.tasks.watching import watching
@@ -431,7 +430,7 @@ def _scaled(timeline: Timeline, shares: Sequence[float]) -> Timeline:
 def _sample_timeline(prior: Prior, timeline: Timeline, sampling: Sampling, foot_lock: bool) -> Motion:
     segment, *more = timeline.segments
     if more:
-        return concatenate(*compose(prior, timeline.segments, foot_lock=foot_lock, sampling=sampling))
+        return compose(prior, timeline.segments, foot_lock=foot_lock, sampling=sampling)
     if segment.goal is not None:
         (controlled,) = control(prior, segment.text, segment.goal, foot_lock=foot_lock, sampling=sampling)
         return controlled.motion

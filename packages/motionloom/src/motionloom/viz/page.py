@@ -128,24 +128,6 @@ def page(takes: Sequence[Take], *, character: Character | None = None, most: int
     return _filled(template, title or "motionloom", {"takes": entries, "unit": UNIT, "character": body})
 
 
-def framed(motion: Motion, *, height: int = 420) -> str:
-    """A motion for a notebook: its page in a frame that may run the viewer and nothing else, at most 1.2 MB.
-
-    Where it cannot be shown a sentence says why.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            text = page([Take("", [motion])], most=1_000_000)
-    except MotionloomError as error:
-        about = f"{len(motion)} frames, {motion.seconds:.2f} s, {len(motion.skeleton)} joints"
-        return f"<p>Motion: {about}. It is not shown: {html.escape(str(error))}</p>"
-    return (
-        f'<iframe srcdoc="{html.escape(text)}" sandbox="allow-scripts" title="motion" '
-        f'style="width: 100%; height: {height}px; border: 0" allowfullscreen></iframe>'
-    )
-
-
 def _in_step(people: Sequence[Motion]) -> list[Motion]:
     """Everybody at the rate of the first, until the last one ends; who ends before stays as they are."""
     if len({(len(motion), motion.fps) for motion in people}) < 2:

@@ -279,12 +279,7 @@ def draw_grid(
 
 def _tile(shape: Figure, text: str, poses: int, mark: Colour | None) -> Image.Image:
     tile = Image.new("RGB", (POSE[0] * poses, POSE[1] + CAPTION), draw.PAPER)
-    frames = np.linspace(0, len(shape) - 1, poses).round().astype(int)
-    camera = _grid_camera(shape, frames)
-    for column, frame in enumerate(frames.tolist()):
-        here = np.array([shape.path[frame, 0], camera.target[1], shape.path[frame, 2]])
-        view = Camera(here, POSE, camera.span, camera.azimuth, camera.elevation)
-        tile.paste(_scene(shape, frame, view, ahead=False), (POSE[0] * column, CAPTION))
+    tile.paste(draw_strip(shape, poses), (0, CAPTION))
     pen = ImageDraw.Draw(tile)
     if mark is not None:
         pen.rectangle((0, 0, 5, CAPTION - 3), fill=mark)
@@ -293,6 +288,18 @@ def _tile(shape: Figure, text: str, poses: int, mark: Colour | None) -> Image.Im
     pen.text((10, 3), shorten(text, 13, room - 8), fill=draw.INK, font=font(13))
     pen.text((tile.width - 4, 4), clock, fill=draw.QUIET, font=font(12), anchor="ra")
     return tile
+
+
+def draw_strip(shape: Figure, poses: int) -> Image.Image:
+    """So many poses over the whole time, side by side, each over the same spot."""
+    strip = Image.new("RGB", (POSE[0] * poses, POSE[1]), draw.PAPER)
+    frames = np.linspace(0, len(shape) - 1, poses).round().astype(int)
+    camera = _grid_camera(shape, frames)
+    for column, frame in enumerate(frames.tolist()):
+        here = np.array([shape.path[frame, 0], camera.target[1], shape.path[frame, 2]])
+        view = Camera(here, POSE, camera.span, camera.azimuth, camera.elevation)
+        strip.paste(_scene(shape, frame, view, ahead=False), (POSE[0] * column, 0))
+    return strip
 
 
 def _grid_camera(shape: Figure, frames: np.ndarray) -> Camera:
