@@ -253,12 +253,6 @@ def test_a_switch_arrives_at_the_target_itself(tmp_path: Path) -> None:
     assert about["pairs"] == 2
 
 
-def test_weights_of_another_skeleton_have_no_parts_to_hold(tmp_path: Path) -> None:
-    blind = predictor(layout=replace(protocol().layout, root=False))
-    with pytest.raises(MotionloomError, match="22 joints"):
-        behaviour.hold(lab(tmp_path), blind)
-
-
 def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:
     from motionloom.cli import main
     from motionloom_lab.papers.benchmark_layouts import HUMANEVA_LAYOUT

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.io import text
+from motionloom.io import npz, text
 from motionloom.io.atomic import finished
-from motionloom_lab.papers.amass import is_amass, read_amass
+from motionloom_lab.papers.amass import AMASS_LICENCE, is_amass, read_amass
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT, TABLES
 from motionloom_lab.papers.plain_pickle import Tables, read_tables
 from motionloom_lab.papers.readers import find_takes
@@ -39,6 +39,10 @@ HUMANEVA_DROPPED = {
     ("Validate/S3", "Walking 1 chunk4"),
 }
 """Chunks with a bad head marker."""
+H36M_FRAMES = 125
+"""Frames of a window of Human3.6M: 25 are observed and 100 predicted."""
+RETARGETED = "amass_retargeted.npy"
+MAX_RETARGETED = 4 << 30
 FARTHEST = 100.0
 """Metres from the middle of the room beyond which numbers are no metres."""
 
@@ -65,6 +69,31 @@ def read_h36m(path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Say = 
         path,
         Protocol("h36m", 50.0, 25, 100, H36M_LAYOUT, tuple(recordings), H36M_LICENCE, speeds=dict(H36M_SPEEDS)),
     )
+
+
+def read_retargeted(path: Path | str, *, splits: tuple[str, ...] = SPLITS) -> Protocol:
+    """``amass_retargeted.npy``: AMASS on the 17 joints of Human3.6M as HumanMAC's zero-shot experiment reads it.
+
+    An array (clips, 125, 17, 3) in metres, +Z up, axes of length 1 anywhere left out: 25 frames are observed and 100
+    predicted, and every clip is one test window. There is no other split. Raises MotionloomError for another form.
+    """
+    array = npz.read_array(path, max_bytes=MAX_RETARGETED)
+    joints = H36M_LAYOUT.joints
+    clips = array.reshape(tuple(n for n in array.shape if n > 1)) if array.ndim > 4 else array
+    clips = clips[None] if clips.ndim == 3 else clips
+    if clips.ndim != 4 or clips.shape[1] < H36M_FRAMES or not len(clips) or "test" not in splits:
+        raise MotionloomError(
+            f"{path} is an array of the shape {array.shape}, and must be (clips, {H36M_FRAMES} or more, {joints}, 3): "
+            "it is tested on, and holds nothing to train on"
+        )
+    width = len(str(len(clips) - 1))
+    recordings = tuple(
+        Recording(f"amass/{k:0{width}d}", "amass", "amass", "test", _placed(clip, joints, f"{path}: clip {k}"))
+        for k, clip in enumerate(clips)
+    )
+    listed = tuple((recording.name, 0) for recording in recordings)
+    name = "amass, retargeted by HumanMAC"
+    return Protocol(name, 50.0, 25, 100, H36M_LAYOUT, recordings, AMASS_LICENCE, listed=listed)
 
 
 def h36m_class(action: str) -> str:
@@ -149,6 +178,8 @@ def find_protocol(
     if name is not None and name not in NAMES:
         raise MotionloomError(f"there is no data set {text.shown(name)} for prediction; name one of {', '.join(NAMES)}")
     kind, place = _recognised(path, name)
+    if kind == "amass" and place.suffix == ".npy":
+        return read_retargeted(place, splits=splits)
     if segments is not None and kind != "amass":
         raise MotionloomError(f"a list of test segments is for AMASS, and {path} is read as {kind}; leave it out")
     if kind == "amass":
@@ -164,9 +195,14 @@ def _recognised(path: Path, name: str | None) -> tuple[str, Path]:
     if not path.is_dir():
         if name in (None, "h36m", "humaneva") and path.suffix == ".npz":
             return name or _file_kind(path), path
+        if name in (None, "amass") and path.suffix == ".npy":
+            return "amass", path
         raise MotionloomError(
-            f"{path} is a file and is not data_3d_h36m.npz or data_3d_humaneva15.npz; name one of those or a folder"
+            f"{path} is a file and is not data_3d_h36m.npz, data_3d_humaneva15.npz or {RETARGETED}; name one of those "
+            "or a folder"
         )
+    if name in (None, "amass") and (path / RETARGETED).is_file():
+        return "amass", path / RETARGETED
     if name in ("amass", "cmu", "own"):
         return name, path
     files = [

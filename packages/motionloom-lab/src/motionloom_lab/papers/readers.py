@@ -20,8 +20,10 @@ def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> lis
 
 
 def find_pairs(folder: Path | str, *, captions: bool = True, say: Say = silent) -> list[Pair]:
-    """As `data.pairs.find_pairs`, and the pairs of a 3DPW folder."""
+    """As `data.pairs.find_pairs`, and the pairs of a 3DPW folder, as its owners or ComMDM's distribute it."""
     folder = Path(folder)
+    if folder.is_dir() and threedpw.is_processed(folder):
+        return threedpw.read_processed(folder, say=say)
     if folder.is_dir() and not (folder / "manifest.csv").is_file() and threedpw.is_3dpw(folder):
         return threedpw.read_3dpw(folder, say=say)
     return pairs.find_pairs(folder, captions=captions, say=say)

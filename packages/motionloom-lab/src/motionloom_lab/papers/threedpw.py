@@ -11,6 +11,8 @@ data of ComMDM (Shafir et al., 2023) was computed from these files by code that 
   follows two walkers takes nothing away, and the distance between the two never changes.
 * *HumanML3D.* Each person's floor to y = 0 by planted feet, uniform bones, 20 frames per second; one common scale on
   the ground (`data.pairs`).
+
+`read_processed` reads the published data themselves, where somebody has them.
 """
 
 from collections.abc import Sequence
@@ -21,6 +23,9 @@ import numpy as np
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.pair import PlaceCode, decode
+from motionloom.io import npz
 from motionloom.io.atomic import finished
 from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import ANKLES, TOES, Array, J, smooth, velocity
@@ -37,6 +42,8 @@ RATE = 30.0
 """Frames per second of the image-aligned poses."""
 SPLITS = {"train": "train", "validation": "val", "test": "test"}
 MAX_BYTES = 512 << 20
+FIRST, SECOND = "_p0", "_p1"
+"""Ends of the names of the two people's files in ComMDM's processed data."""
 _PLANTED_SPEED, _PLANTED_HEIGHT = 0.4, 0.06
 
 
@@ -83,6 +90,72 @@ def read_3dpw(
     if not pairs:
         raise MotionloomError(f"{folder} has no sequence with two people in {', '.join(splits)}")
     return pairs
+
+
+def is_processed(folder: Path) -> bool:
+    """Whether ``folder`` is ComMDM's processed 3DPW: ``new_joint_vecs/SPLIT/NAME_p0.npy`` and so on."""
+    return any(finished(folder / "new_joint_vecs" / split, f"*{FIRST}.npy") for split in SPLITS)
+
+
+def read_processed(
+    folder: Path | str, *, splits: Sequence[str] = ("train", "validation"), say: Say = silent
+) -> list[Pair]:
+    """The pairs of ComMDM's processed 3DPW (Shafir et al. 2023).
+
+    ``new_joint_vecs/SPLIT/NAME_p0.npy`` and ``NAME_p1.npy`` are HumanML3D features (frames, 263) of both people;
+    ``canon_data/SPLIT`` has under the same names nine numbers that say where each is at frame 0 (two rows of the
+    rotation from the world to the person, a translation); ``text/SPLIT/NAME_p0.txt`` or ``NAME.txt`` has captions. The
+    mirrored copies (``NAME_p0_M.npy``), which keep the words left and right, are left out: pairs are mirrored in
+    training. The second person is placed by the whole ground pose of the first, and not as published with a
+    translation that is not turned.
+
+    Args:
+        folder: ``dataset/3dpw`` of the published layout.
+        splits: of train, validation and test.
+        say: called with what is left out and why.
+
+    Raises:
+        MotionloomError: no such files, one of another form (named), a person or a place that is missing.
+    """
+    folder, pairs = Path(folder), []
+    for split in splits:
+        for path in finished(folder / "new_joint_vecs" / split, f"*{FIRST}.npy"):
+            name = path.name.removesuffix(f"{FIRST}.npy")
+            captions = _captions(folder / "text" / split, name)
+            if not captions:
+                say(f"{split}/{name} has no captions")
+            pairs.append(Pair(name, SPLITS[split], captions, "3dpw", LICENCE, _processed_pair(folder, split, name)))
+    if not pairs:
+        raise MotionloomError(f"{folder} has no new_joint_vecs/SPLIT/NAME{FIRST}.npy for {', '.join(splits)}")
+    return pairs
+
+
+def _processed_pair(folder: Path, split: str, name: str) -> Array:
+    """(2, frames, 22, 3) metres at 20 frames per second."""
+    features, places = [], []
+    for end in (FIRST, SECOND):
+        path, place = (folder / part / split / f"{name}{end}.npy" for part in ("new_joint_vecs", "canon_data"))
+        features.append(_whole_array(path))
+        places.append(_whole_array(place).reshape(-1))
+        if features[-1].ndim != 2 or features[-1].shape[1] != WIDTH or len(features[-1]) < 2:
+            raise MotionloomError(
+                f"{path} has the shape {features[-1].shape}; HumanML3D features are (frames, {WIDTH})"
+            )
+        if places[-1].shape != (9,):
+            raise MotionloomError(f"{place} has {places[-1].size} numbers; where somebody is at frame 0 are nine")
+    if len(features[0]) != len(features[1]):
+        raise MotionloomError(
+            f"{folder}: {name} has {len(features[0])} frames of one and {len(features[1])} of another"
+        )
+    poses = PlaceCode("world").decode(np.stack(places)[:, [0, 2, 6, 8]])
+    return checked(decode(np.stack(features), poses), FPS, name=f"{folder}: {name}")
+
+
+def _whole_array(path: Path) -> Array:
+    array = npz.read_array(path)
+    if array.dtype.kind not in "fiu" or not np.isfinite(array).all() or not (np.abs(array) < 1e4).all():
+        raise MotionloomError(f"{path} holds no finite numbers of a person's motion")
+    return array.astype(np.float64)
 
 
 def as_pair(people: np.ndarray, *, name: str) -> Array:

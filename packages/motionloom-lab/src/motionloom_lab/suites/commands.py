@@ -142,7 +142,9 @@ def study(asked: Asked) -> None:
     budget = studies.budget(name, quick=bool(asked.get("quick")), changes=changes)
     run = job_of(asked, options.typed(options.commands()["study"], asked), out).run("study")
     keep = asked.get("keep", out / "networks")
-    found = studies.run(name, run, protocol=asked.get("protocol"), keep=keep, budget=budget)
+    values = studies.values_of(name, asked.get("values") or ())
+    net = {key: asked[key] for key in studies.SIZES if asked.get(key) is not None}
+    found = studies.run(name, run, protocol=asked.get("protocol"), keep=keep, budget=budget, values=values, net=net)
     print(reports.plain(found))
     print(f"\nwritten: {out / name}.md, .json, .png")
 

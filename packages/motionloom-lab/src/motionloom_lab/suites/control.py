@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from motionloom_lab.report.report import REAL, Report
 from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import control_kinds, text_reference
 from motionloom_lab.suites.control_kinds import Kind, Target
-from motionloom_lab.suites.control_methods import BASE, METHODS, Maker, Track, checked, fits, maker
+from motionloom_lab.suites.control_methods import BASE, METHODS, Maker, Track, checked, fits, maker, trained_controls
 from motionloom_lab.suites.harness import Parts, Run, check_names, digest, diversity, physical_mean, replicated, row_of
 from motionloom_lab.suites.items import Item, fitting, pick, read_items, spread
 from motionloom_lab.suites.protocol import Protocol, Selection
@@ -273,6 +274,7 @@ def run(
     methods: Sequence[str] = METHODS,
     selection: Selection | None = None,
     protocol: Protocol | None = None,
+    trained: Sequence[str | Path] = (),
 ) -> Report:
     """Measure the control of weights on goals out of the real motions of ``run.data``.
 
@@ -282,22 +284,30 @@ def run(
         methods: ways of control, a row each.
         selection: which real motions of the data; None: the usual ones.
         protocol: as of `settings`.
+        trained: networks for the rows "fine-tuned" and "DiffusionBlending" (`control_methods.trained_controls`); none:
+            the shipped adapters, which belong to the shipped prior.
     """
     protocol, goals = protocol or settings(), control_kinds.kinds(kinds)
     check_names(methods, METHODS, "ways of control")
     if run.data is None:
         raise MotionloomError("goals are taken out of real motions, and none are shipped; name a set with --data")
     prior = run.prior(protocol.steps[0])  # unusable weights are reported before anything is read
+    controls = trained_controls(prior, trained) if trained else None
     judge, selection = run.judge(), fitting(run.data, selection)
     trial = prepare(
         read_items(run.data, selection),
         judge,
-        maker(prior, protocol.drawing(protocol.steps[0])),
+        maker(prior, protocol.drawing(protocol.steps[0]), controls),
         protocol,
         scale=prior.std,
         selection=selection,
     )
     files = {name: digest(path) for name, path in adapters().items()}
+    if trained:
+        places = [str(word).rpartition("=")[2] for word in trained]
+        files = {
+            str(word): files.get(place) or digest(Path(place)) for word, place in zip(trained, places, strict=True)
+        }
     about = {**protocol.sampling(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
     parts = run.parts({**about, **run.settings(judge)})
     return measure(trial, goals, methods, run, parts=parts)

@@ -1,8 +1,9 @@
 """The rows of the suite `control`: ways to make a motion that meets a goal, each a function of targets and seeds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Protocol as Interface
 
 import numpy as np
@@ -16,6 +17,7 @@ from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.adapter import Adapter, adapted, adapters
+from motionloom.weights.container import PRIORS
 from motionloom.weights.prior import Prior
 from motionloom_lab.papers.diffusion_blending import control_features
 from motionloom_lab.suites.control_kinds import Kind, Target
@@ -24,6 +26,10 @@ from motionloom_lab.suites.protocol import Drawing
 UNCONTROLLED, EXPORTED = "uncontrolled", "uncontrolled, as exported"
 INPAINTING, TUNED, BLENDING = "MDM inpainting", "fine-tuned", "DiffusionBlending"
 LOOSE, OURS = "ours without exact fit", "ours"
+CONTROLS = ("trajectory", "left_wrist", "right_wrist", "left_foot", "right_foot", "head", "any")
+"""What a network can be trained to follow."""
+ALIASES = {"root_horizontal": "trajectory", "root": "trajectory"}
+"""What published checkpoints call it."""
 METHODS = (UNCONTROLLED, EXPORTED, INPAINTING, TUNED, BLENDING, LOOSE, OURS)
 """In the order of the table."""
 BASE = {
@@ -63,13 +69,63 @@ def fits(one: Kind, name: str) -> bool:
     return {TUNED: len(one.adapters) == 1, BLENDING: len(one.adapters) > 1}.get(name, True)
 
 
-def maker(prior: Prior, how: Drawing) -> Maker:
-    """The methods of a prior and its shipped adapters; a control that has none of its own takes ``any``."""
+def trained_controls(prior: Prior, files: Sequence[str | Path]) -> dict[str, PriorSession]:
+    """Networks that were trained for control, by what each was trained for: ``trajectory``, a joint, ``any``.
+
+    Args:
+        prior: the weights without control, which each of them is compared with.
+        files: adapters of this prior, by file or shipped name, and whole priors that were fine-tuned from it, such as
+            imported ones of Shafir et al. 2024 and those of ``train control full=true``. ``CONTROL=FILE`` names the
+            control of a file that does not say it.
+
+    Raises:
+        MotionloomError: a file that is neither, of other numbers than the prior's, of no known control, or two of one.
+    """
+    result: dict[str, PriorSession] = {}
+    for word in map(str, files):
+        named, _, file = word.rpartition("=")
+        control, net = _trained_control(prior, file)
+        control = ALIASES.get(named or control, named or control)
+        if control not in CONTROLS:
+            raise MotionloomError(
+                f"{file} does not say which control it was trained for ({control!r:.60}); write "
+                f"CONTROL={Path(file).name} with one of {', '.join(CONTROLS)}"
+            )
+        if control in result:
+            raise MotionloomError(f"two of the networks were trained for {control}; name one of each control")
+        result[control] = net
+    return result
+
+
+def _trained_control(prior: Prior, file: str) -> tuple[str, PriorSession]:
+    """What a file was trained for, and its network: an adapter's upon the prior's, or a whole one."""
+    path = adapters().get(file) or Path(file)
+    if path.is_file() and PRIORS.signed(path):
+        whole = Prior.load(path)
+        if whole.net.config.features != prior.net.config.features or not (
+            np.allclose(whole.mean, prior.mean, atol=1e-4) and np.allclose(whole.std, prior.std, atol=1e-4)
+        ):
+            raise MotionloomError(f"{file} is of other numbers than the weights; name networks fine-tuned from those")
+        known = whole.card.notes.get("control")
+        names = (known, whole.card.name, path.stem)
+        return next((str(name) for name in names if name in (*CONTROLS, *ALIASES)), path.stem), whole.net
+    adapter = Adapter.load(file, prior)
+    return adapter.control, adapted(prior.net, adapter)
+
+
+def maker(prior: Prior, how: Drawing, controls: Mapping[str, PriorSession] | None = None) -> Maker:
+    """The methods of a prior and of networks trained for control (`trained_controls`; None: its shipped adapters); a
+    control that has none of its own takes ``any``."""
     shipped = adapters()
 
     @cache
-    def net(name: str):
-        return adapted(prior.net, Adapter.load(name if name in shipped else "any", prior))
+    def net(name: str) -> PriorSession:
+        if controls is None:
+            return adapted(prior.net, Adapter.load(name if name in shipped else "any", prior))
+        chosen = name if name in controls else "any"
+        if chosen not in controls:
+            raise MotionloomError(f"none of the networks was trained for {name}; there are {', '.join(controls)}")
+        return controls[chosen]
 
     def make(one: Kind, name: str) -> Method:
         if name in (UNCONTROLLED, EXPORTED):

@@ -72,6 +72,7 @@ def control(job: "Job", options: Options) -> Report:
         kinds=settings.get("kinds", control_kinds.DEFAULT),
         methods=settings.get("method", control.METHODS),
         selection=selection(options),
+        trained=options.get("adapters") or (),
         protocol=control.settings(**{name: settings[name] for name in names if name in settings}),
     )
 

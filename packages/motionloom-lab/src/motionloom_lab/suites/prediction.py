@@ -85,8 +85,7 @@ def run(
     predictor = Predictor.load(run.weights, device=run.device)
     for steps in (how.steps, how.published_steps):
         check_steps(steps, predictor.schedule.steps - 1)
-    protocol = trials.read_test(run.data, name, say=run.progress)
-    trials.check_fit(predictor, protocol)
+    protocol = trials.fitted(predictor, trials.read_test(run.data, name, say=run.progress))
     return measure(
         predictor,
         trials.prepare(protocol, count=how.windows, singles=how.singles),

@@ -4,8 +4,8 @@ Every function takes a `Lab` and a predictor, and gives columns, rows and furthe
 `prediction_studies` writes them.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,16 @@ import numpy as np
 
 from motionloom.diffusion import row_seed
 from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom.features.positions import Layout
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.kinematics import physics
 from motionloom.kinematics.ik import motion_from_positions
+from motionloom.kinematics.layout_body import body_of_places, layout_skeleton, smpl_joints
 from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known, WindowSampler, next_frames
+from motionloom.tasks.other_joints import sees_person
 from motionloom.tasks.predict import predict, switch
 from motionloom.weights.predictor import Predictor
 from motionloom_lab.metrics import prediction as metrics
@@ -59,6 +61,10 @@ class Lab:
     budget: Budget
     keep: Path
     """Where trained networks lie."""
+    net: Mapping[str, Any] = field(default_factory=dict)
+    """Sizes of the networks that are trained, other than the usual small ones (``[predictor]`` of a recipe)."""
+    values: tuple[Any, ...] = ()
+    """What the setting of a study is changed to; empty: its usual values."""
     device: str = "cpu"
     say: Say = silent
 
@@ -148,7 +154,6 @@ def _spread(motions: Array, layout: Layout) -> float:
 
 def hold(lab: Lab, predictor: Predictor) -> Findings:
     """Each group of joints given in all of the future: how much nearer the others come, how they vary."""
-    _need_person(predictor)
     trial = trials.prepare(lab.protocol, count=lab.budget.windows)
     rows = []
     for group in GROUPS:
@@ -161,9 +166,11 @@ def hold(lab: Lab, predictor: Predictor) -> Findings:
 def held_numbers(
     predictor: Predictor, trial: PredictionTrial, group: str, *, samples: int, seed: int
 ) -> dict[str, float]:
-    """Means over windows, largest errors; joints of a group of the 22."""
-    joints = sorted(SMPL22.groups[group])
-    free = [j - 1 for j in range(1, 22) if j not in joints]
+    """Means over windows, largest errors; the predictor's joints that lie in a group of the 22."""
+    layout = predictor.layout
+    joints = [j for j, parts in enumerate(smpl_joints(layout)) if set(parts) <= set(SMPL22.groups[group])]
+    joints = [j for j in joints if j or layout.root]
+    free = [j - 1 for j in range(1, layout.joints) if j not in joints]
     mask = np.zeros((trial.protocol.future, predictor.layout.parts), dtype=np.float32)
     mask[:, [predictor.layout.part(j) for j in joints]] = 1
     seeds = [row_seed(seed, i) for i in range(samples)]
@@ -193,11 +200,12 @@ def held_numbers(
 
 
 def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, group: str, *, seed: int) -> float:
-    """Largest difference between a held rotation in the motion that `predict` gives and the one it was held to."""
+    """Largest difference between a held rotation in the motion that `predict` gives and the one it was held to; 0 for a
+    predictor of other joints than the 22, which holds places."""
+    if not sees_person(predictor):
+        return 0.0
     lead, joints = trial.protocol.observed, [j for j in SMPL22.groups[group] if j]
-    whole = motion_from_positions(
-        np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)]), predictor.fps
-    )
+    whole = _clip(predictor, trial, number)
     source = whole.frames(lead, len(whole))
     held = FixedJoints(source, (FixedPart((group,)),), align=False)
     seconds = len(source) / predictor.fps
@@ -206,18 +214,23 @@ def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, gr
     return float(np.minimum(np.abs(own - target).max(-1), np.abs(own + target).max(-1)).max())
 
 
+def _clip(predictor: Predictor, trial: PredictionTrial, number: int) -> Motion:
+    """The recorded window of a number as a motion: of the uniform person, or of the predictor's joints."""
+    places = np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)])
+    if sees_person(predictor):
+        return motion_from_positions(places, predictor.fps)
+    first = np.concatenate([trial.pasts(0, 1)[0], trial.future(0)])  # one skeleton for all, as a switch needs
+    return body_of_places(places, layout_skeleton(predictor.layout, first), predictor.fps)
+
+
 def arrive(lab: Lab, predictor: Predictor) -> Findings:
     """The way from one recording to another, for transitions of several lengths."""
     protocol, budget = lab.protocol, lab.budget
-    _need_person(predictor)
     trial = trials.prepare(protocol, count=budget.windows)
     count = len(trial.windows)
     if count < 2:
         raise MotionloomError("a switch leads from one window to another; measure two or more")
-    clips = [
-        motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
-        for k in range(count)
-    ]
+    clips = [_clip(predictor, trial, k) for k in range(count)]
     lead, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
     middle = lead + protocol.future // 2
     rows = [plain_row(REAL, _mean([_ends(c.positions(), lead, middle, predictor.fps) for c in clips]))]
@@ -242,8 +255,17 @@ def switched(predictor: Predictor, past: Motion, target: Motion, *, seconds: flo
     """Numbers of one transition."""
     (motion,) = switch(predictor, past, target, count=1, seconds=seconds, seed=seed)
     places, first, fps = motion.positions(), len(motion) - len(target), predictor.fps
-    own = own_poses(np.stack([places[first], target.positions()[0]]), SMPL_LAYOUT)
+    own = own_poses(np.stack([places[first], target.positions()[0]]), facing_layout(predictor.layout))
     return _ends(places, len(past), first, fps) | {"target": float(np.abs(own[0] - own[1]).max())}
+
+
+def facing_layout(layout: Layout) -> Layout:
+    """The layout turned to the facing that its hips show, so that poses are compared from where they face."""
+    hips = ("left_hip", "right_hip")
+    if layout.across or not set(hips) <= set(layout.names):
+        return layout
+    left, right = (layout.names.index(name) for name in hips)
+    return replace(layout, across=((left, right),), z_up=False)
 
 
 def _ends(places: Array, start: int, end: int, fps: float) -> dict[str, float]:
@@ -259,11 +281,6 @@ def _seam(places: Array, at: int, fps: float, name: str) -> dict[str, float]:
 
 def _mean(rows: list[dict[str, float]]) -> dict[str, float]:
     return {key: float(np.mean([one[key] for one in rows])) for key in rows[0]}
-
-
-def _need_person(predictor: Predictor) -> None:
-    if predictor.layout.names != SMPL_LAYOUT.names or not predictor.layout.root:
-        raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
 
 
 STUDIES: dict[str, Callable[[Lab, Predictor], Findings]] = {"horizon": horizon, "hold": hold, "switch": arrive}

@@ -40,6 +40,8 @@ STUDIED: dict[str, tuple[str, tuple[Any, ...]]] = {
     "dct": ("dct", (True, False)),
 }
 """What each training study changes, and to what."""
+SIZES = ("width", "layers", "heads", "kept", "variant")
+"""Sizes of the networks of a study that can be set."""
 TITLES = {
     "coefficients": "Number of cosine coefficients",
     "layers": "Layers",
@@ -52,6 +54,8 @@ TITLES = {
     "switch": "Arriving at another motion",
 }
 MOST = 1_000_000
+PUBLISHED_STEPS = 100
+"""Of the published sampler."""
 SPREADS = ("index", "early", "snr")
 MEASURES = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
 
@@ -65,7 +69,36 @@ def budget(name: str, *, quick: bool = False, changes: Mapping[str, int] | None 
     return chosen
 
 
-def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget: Budget) -> Report:
+def values_of(name: str, words: Sequence[str]) -> tuple[Any, ...]:
+    """What a study changes its setting to, out of words; raises MotionloomError for what the setting cannot be."""
+    if not words:
+        return ()
+    if name not in STUDIED:
+        raise MotionloomError(f"the study {name} changes nothing of a network; leave --values out")
+    setting, usual = STUDIED[name]
+    known = (
+        {str(value).lower(): value for value in usual} if not isinstance(usual[0], int) or setting == "dct" else None
+    )
+    try:
+        values = tuple(int(word) for word in words) if known is None else tuple(known[word.lower()] for word in words)
+    except (ValueError, KeyError):
+        kinds = "whole numbers" if known is None else ", ".join(known)
+        raise MotionloomError(f"the values of the study {name} are {kinds}; got {' '.join(words)}") from None
+    if known is None and not all(1 <= value <= 8192 for value in values):
+        raise MotionloomError(f"the values of the study {name} are from 1 to 8192; got {' '.join(words)}")
+    return tuple(dict.fromkeys(values))
+
+
+def run(
+    name: str,
+    run: Run,
+    *,
+    protocol: str | None = None,
+    keep: Path,
+    budget: Budget,
+    values: tuple[Any, ...] = (),
+    net: Mapping[str, Any] | None = None,
+) -> Report:
     """Do a study and write its table and picture into ``run.folder``.
 
     Args:
@@ -74,6 +107,9 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
         protocol: which data set that is; None: recognised by its files.
         keep: where trained networks lie.
         budget: how much is measured.
+        values: what a study that trains changes its setting to (`values_of`); empty: its usual values.
+        net: sizes of the networks that are trained, beside `BASE`; ``{"variant": "published"}`` trains and samples as
+            Chen et al. 2023 do.
 
     Raises:
         MotionloomError: before any work if it cannot be done.
@@ -84,6 +120,8 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
         raise MotionloomError("a study needs recordings and a folder for its table and picture")
     files.check_report(run.folder / f"{name}.json")
     trained = name in STUDIED
+    if net and not trained:
+        raise MotionloomError(f"the study {name} trains no network; leave sizes out")
     predictor = None if trained else Predictor.load(run.weights, device=run.device)
     if trained or name == "horizon":
         data = find_protocol(
@@ -92,8 +130,8 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
     else:
         data = trials.read_test(run.data, protocol, say=run.progress)
     if predictor is not None:
-        trials.check_fit(predictor, data)
-    lab = Lab(data, budget, keep, run.device, run.progress)
+        data = trials.fitted(predictor, data)
+    lab = Lab(data, budget, keep, net or {}, values, run.device, run.progress)
     report = replace(study(name, lab, predictor), command=run.command)
     if not trained:
         report = replace(
@@ -132,6 +170,7 @@ def write(report: Report, name: str, folder: Path) -> None:
 
 def _trained(name: str, lab: Lab) -> Findings:
     setting, values = STUDIED[name]
+    values = lab.values or values
     trial = trials.prepare(lab.protocol, count=lab.budget.windows)
     rows = [_row(REAL, trials.score(trial, None))]
     for value in values:
@@ -139,29 +178,44 @@ def _trained(name: str, lab: Lab) -> Findings:
             continue
         predictor = network(lab, setting, value)
         size = sum(values.size for values in predictor.net.weights.values())
-        for steps in (10, 50) if name == "noising" else (STEPS,):
+        for steps in _steps_of(name, value, lab):
             label = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
             lab.say(f"{label}: {len(trial.windows)} windows")
             scored = _scored(lab, trial, predictor, PredictionSampling(steps=steps))
             rows.append(_row(label, scored | {"parameters": size / 1e6}))
-    size = Column("parameters", "M parameters", "", "millions", 2)
+    size, sizes = Column("parameters", "M parameters", "", "millions", 2), {**BASE, **lab.net}
+    sampler = f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said"
     about = {
-        "networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
+        "networks": f"width {sizes['width']}, {sizes['layers']} layers, {sizes['kept']} coefficients unless said",
         "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",
-        "sampler": f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said",
+        "sampler": f"published, {PUBLISHED_STEPS} steps unless said" if _published(lab) else sampler,
     }
     return [*_columns(MEASURES), size], rows, about
+
+
+def _published(lab: Lab) -> bool:
+    return lab.net.get("variant") == "published"
+
+
+def _steps_of(name: str, value: Any, lab: Lab) -> tuple[int, ...]:
+    """The sampling steps of each row of a trained network: published ones have a tenth of the noise levels."""
+    if _published(lab):
+        return (max(min(PUBLISHED_STEPS, value // 10 if name == "noising" else PUBLISHED_STEPS), 1),)
+    return tuple(steps for steps in (10, 50) if steps < value) if name == "noising" else (STEPS,)
 
 
 def network(lab: Lab, setting: str, value: Any) -> Predictor:
     """The small network with one thing changed: trained, trained further, or as it lies in ``lab.keep``."""
     own = {setting: value} if setting in BASE or (setting, value) == ("dct", False) else {}
-    net: dict[str, Any] = BASE | own
+    net: dict[str, Any] = BASE | dict(lab.net) | own
+    if _published(lab):
+        net |= {"dropout": 0.2, "condition_dropout": 0.2}
     net["kept"] = min(net["kept"], lab.protocol.frames)
     other = {setting: value} if setting in ("schedule", "levels") else {}
     schedule, levels = other.get("schedule", "cosine"), other.get("levels", 1000)
     dct = "dct" if net.get("dct", True) else "frames"
     name = f"{dct}{net['kept']}-layers{net['layers']}-{schedule}-{levels}-steps{lab.budget.train_steps}"
+    name += "".join(f"-{key}{net[key]}" for key in ("width", "heads", "variant") if key in lab.net)
     steps = lab.budget.train_steps
     recipe = Recipe(
         name=name,
@@ -214,6 +268,10 @@ def _steps(lab: Lab, predictor: Predictor) -> Findings:
 def _scored(lab: Lab, trial: PredictionTrial, predictor: Predictor, how: PredictionSampling) -> dict[str, float]:
     samples = lab.budget.samples
     how = replace(how, count=samples, seed=lab.budget.seed, guidance=1.0, batch_size=trials.ROWS)
+    if _published(lab):
+        steps = how.steps or STEPS
+        way = prediction.as_published(predictor, lab.budget.seed, samples=samples, steps=steps)
+        return trials.score(trial, way, samples=samples, say=lab.say)
     return trials.score(trial, partial(futures, predictor, sampling=how), samples=samples, say=lab.say)
 
 

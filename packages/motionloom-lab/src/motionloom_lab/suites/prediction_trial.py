@@ -17,8 +17,10 @@ from motionloom.features import humanml
 from motionloom.features.layout import FPS
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.io.atomic import finished
+from motionloom.kinematics.layout_body import places_on_layout
 from motionloom.weights.predictor import Predictor
 from motionloom_lab.metrics import prediction as metrics
+from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom_lab.papers.benchmarks import find_protocol
 from motionloom_train.data.clips import read_clip
 from motionloom_train.data.prediction import CMU_TEST, Protocol, Recording, checked
@@ -121,7 +123,7 @@ def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Si
         raise MotionloomError(f"no test window of {protocol.name} has more than one future; count those with one too")
     places = np.linspace(0, len(usable) - 1, min(count or len(usable), len(usable))).round().astype(int)
     chosen = [usable[k] for k in places]
-    h36m = protocol.name == "h36m"
+    h36m = protocol.layout.names == H36M_LAYOUT.names
     limbs = metrics.H36M_LIMBS if h36m else metrics.limbs_of(protocol.layout.parents)
     trial = PredictionTrial(
         protocol, tuple(every[k] for k in chosen), every, tuple(near[k] for k in chosen), limbs, singles, {}
@@ -149,6 +151,44 @@ def check_fit(predictor: Predictor, protocol: Protocol) -> None:
         raise MotionloomError(
             f"these weights are for {sizes[0]}, and {protocol.name} has {sizes[1]}; name weights trained on such data"
         )
+
+
+def fitted(predictor: Predictor, protocol: Protocol) -> Protocol:
+    """A data set as a predictor sees it, so that a network is tried on people that it was not trained on.
+
+    Recordings of the 22 joints become those of a predictor of other joints, at its rate and for its window
+    ("zero-shot", Chen et al. 2023, section 5.6): joints by name, left and right as they are, bones not scaled. Other
+    data sets are returned as they are. Raises MotionloomError as `check_fit` for what fits in neither way.
+    """
+    layout = predictor.layout
+    if layout.names == protocol.layout.names or protocol.layout.names != SMPL_LAYOUT.names:
+        check_fit(predictor, protocol)
+        return protocol
+    ratio = predictor.fps / protocol.fps
+    recordings = tuple(
+        replace(r, positions=_places_at(predictor, r.positions, protocol.fps))
+        for r in protocol.recordings
+        if len(r.positions) > 1
+    )
+    return replace(
+        protocol,
+        name=f"{protocol.name}, zero-shot",
+        fps=predictor.fps,
+        observed=predictor.observed,
+        future=predictor.frames - predictor.observed,
+        layout=layout,
+        recordings=recordings,
+        first=round(protocol.first * ratio),
+        stride=round(protocol.stride * ratio),
+        listed=tuple((name, round(start * ratio)) for name, start in protocol.listed),
+        threshold=0.5,
+        speeds={},
+    )
+
+
+def _places_at(predictor: Predictor, positions: np.ndarray, fps: float) -> NDArray[np.float32]:
+    places = humanml.resample_positions(positions, fps, target=predictor.fps)
+    return places_on_layout(predictor.layout, places).astype(np.float32)
 
 
 def score(

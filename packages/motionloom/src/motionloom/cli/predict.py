@@ -19,10 +19,12 @@ from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check
 from motionloom.goals import mask_file
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.io import check_output
+from motionloom.io.layout_places import is_places, read_places
 from motionloom.io.stream import check_length, resampled
 from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.tasks import Predict, Switch
 from motionloom.retarget import retarget
+from motionloom.tasks.other_joints import on_joints_of, sees_person
 from motionloom.tasks.predict import predict_pieces
 from motionloom.tasks.run import Models, Plan
 from motionloom.weights.predictor import Predictor
@@ -45,10 +47,10 @@ def run_predict(arguments: Namespace) -> int:
     own = target.suffix
     formats = arguments.format or [own[1:] if own else "bvh"]
     outputs = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
-    past, target, horizon = _read_past(arguments, target, outputs)
-    hold = _hold(arguments, past, horizon)
-    check_loop_behind(arguments, past.seconds, arguments.seconds, "nothing is held there" if hold else "")
     predictor = Predictor.load(arguments.weights, device=arguments.device)
+    past, target, horizon = _read_past(arguments, predictor, target, outputs)
+    hold = _hold(arguments, predictor, past, horizon)
+    check_loop_behind(arguments, past.seconds, arguments.seconds, "nothing is held there" if hold else "")
     if arguments.seconds > LONG:
         known, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
         long = Long(outputs, target, known, frames, _caption(arguments))
@@ -95,11 +97,11 @@ def run_switch(arguments: Namespace) -> int:
     for out in outs:
         check_output(out, own=own)  # files, and no folder
     outputs = targets(outs, arguments.count, [], pictures=False, own=own)
-    past, put_on, horizon = _read_past(arguments, put_on, outputs)
-    target = _like_past(arguments, arguments.target, past)
+    predictor = Predictor.load(arguments.weights, device=arguments.device)
+    past, put_on, horizon = _read_past(arguments, predictor, put_on, outputs)
+    target = _like_past(arguments, predictor, arguments.target, past)
     _check_poses(arguments, (len(past) + len(target) + horizon) * len(past.skeleton))
     check_loop_behind(arguments, past.seconds, arguments.seconds + target.seconds, f"{arguments.target} ends otherwise")
-    predictor = Predictor.load(arguments.weights, device=arguments.device)
     values = request_of(arguments, Switch, {"motion": past, "target": target})
     plan = Plan(task="switch", values=values, sampling=values.sampling, people=(past,), target=target)
     return _write_all(arguments, plan, predictor, outputs, put_on)
@@ -172,23 +174,46 @@ def _caption(arguments: Namespace) -> str:
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(arguments: Namespace, target: Target, outputs: list[Files]) -> tuple[Motion, Target, int]:
+def _read_past(
+    arguments: Namespace, predictor: Predictor, target: Target, outputs: list[Files]
+) -> tuple[Motion, Target, int]:
     """The past, what futures of it become, and the frames that are generated behind it."""
     files = [file for one in outputs for file in one.files]
     check_unit(arguments, files)
     check_overwriting(arguments, files)
-    whole, unit, orders = read_clip(arguments, arguments.past)
-    check_size(arguments, arguments.past, whole)
+    whole, unit, orders = _read_motion(arguments, predictor, arguments.past)
     past = crop(whole, arguments)
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here; a past has at least two, to say where one goes: take a longer one")
+    if not sees_person(predictor):
+        past, orders = on_joints_of(predictor, past), {}
+        _note_joints(arguments, predictor)
     horizon = round(arguments.seconds * past.fps)
     _check_size(arguments, past, horizon, outputs)
     return past, target.like(unit, orders), horizon
 
 
-def _like_past(arguments: Namespace, path: Path, past: Motion) -> Motion:
+def _read_motion(arguments: Namespace, predictor: Predictor, path: Path) -> tuple[Motion, float | None, dict[str, str]]:
+    """As `read_clip`; places of the predictor's joints are read too."""
+    if not sees_person(predictor) and is_places(path):
+        return read_places(path, predictor.layout, arguments.source_fps or predictor.fps), None, {}
+    clip = read_clip(arguments, path)
+    check_size(arguments, path, clip[0])
+    return clip
+
+
+def _note_joints(arguments: Namespace, predictor: Predictor) -> None:
+    layout, where = predictor.layout, "" if predictor.layout.root else ", in place"
+    note(
+        f"{arguments.weights} sees {layout.joints} joints at {predictor.fps:g} fps{where}: the past is put on them, "
+        "and the futures are motions of that skeleton"
+    )
+
+
+def _like_past(arguments: Namespace, predictor: Predictor, path: Path, past: Motion) -> Motion:
     """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
+    if not sees_person(predictor):
+        return on_joints_of(predictor, _read_motion(arguments, predictor, path)[0], skeleton=past.skeleton)
     alike = path.suffix.lower() == arguments.past.suffix.lower()
     motion = read_clip(arguments, path)[0] if alike else load_motion(arguments, path)
     difference = _difference(motion, past)
@@ -218,7 +243,7 @@ def _difference(motion: Motion, past: Motion) -> str:
     return "bones that change length" if motion.translations is not None and past.translations is None else ""
 
 
-def _hold(arguments: Namespace, past: Motion, horizon: int) -> FixedJoints | None:
+def _hold(arguments: Namespace, predictor: Predictor, past: Motion, horizon: int) -> FixedJoints | None:
     """What is held, if anything is."""
     if not (arguments.hold or arguments.mask):
         if arguments.source is not None:
@@ -236,7 +261,7 @@ def _hold(arguments: Namespace, past: Motion, horizon: int) -> FixedJoints | Non
         fail(f"nothing is held before {late:g} s, and the prediction ends at {seconds:g} s; give a longer --seconds")
     if mask_file.fixes_everything(parts, seconds):
         fail("all joints are held all of the time, so that nothing is left to predict; hold fewer")
-    source = _like_past(arguments, arguments.source, past)
+    source = _like_past(arguments, predictor, arguments.source, past)
     skipped = round(arguments.from_time * past.fps)
     last = max(min(end, seconds) for part in parts for begin, end in part.spans if begin < seconds)
     if len(source) - skipped < round(last * past.fps):

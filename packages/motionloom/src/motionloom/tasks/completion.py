@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import quintic_decay, smoothstep
-from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
+from motionloom.diffusion import SOLVERS, Constraint, NoiseSource, guide, observe, row_noise, row_seed, sample
 from motionloom.diffusion.sampling import Snapshot
 from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
@@ -74,11 +74,16 @@ def complete(
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
     observed one. Known numbers are returned as they are, and the others leave them without a jump. ``sampling``, or
     single settings of it as keywords: a guidance above 1 exaggerates the condition, below 1 heeds it less; it needs a
-    second pass. ``poses``: such windows as (rows, people, frames, 22, 3) metres, for who is `watching`; None: nobody
-    can.
+    second pass. The condition of the published variant knows the first frames only: what else is known is mixed into
+    the state after every step (DCT-Completion; Chen et al. 2023, section 4.5). ``poses``: such windows as (rows,
+    people, frames, 22, 3) metres, for who is `watching`; None: nobody can.
     """
     chosen = PredictionSampling.of(sampling, settings)
-    windows = _Windows(predictor, predictor.condition(features, mask, pose), pose, chosen)
+    seen = _leading(mask) if predictor.variant == "published" else mask
+    each = mask.astype(features.dtype).repeat(3, axis=-1)
+    filled = each * features + (1 - each) * pose[:, None]
+    held = None if np.array_equal(seen, mask) else (predictor.to_state(filled, pose), mask)
+    windows = _Windows(predictor, predictor.condition(features, seen, pose), pose, chosen, held)
     way = chosen.levels(predictor.schedule)
     if chosen.best_of > 1:
         seeds = windows.best_seeds(seeds, way[: len(way) // 2 + 1])
@@ -98,6 +103,8 @@ class _Windows:
     condition: np.ndarray
     pose: np.ndarray
     sampling: PredictionSampling
+    held: tuple[np.ndarray, np.ndarray] | None = None
+    """A state and where in time (rows, frames, parts) it is known, where the condition does not say it."""
 
     def walk(self, seeds: Sequence[int], levels: Sequence[int]) -> Iterator[Snapshot]:
         """From noise, one seed to a window, through the levels."""
@@ -114,14 +121,23 @@ class _Windows:
             solver=SOLVERS[self.sampling.solver],
             schedule=self.predictor.schedule,
             noise=noise,
+            constrain=self.constraint(noise),
         )
+
+    def constraint(self, noise: NoiseSource) -> Constraint | None:
+        """What mixes the known into a state, in time; None where the condition says all of it."""
+        if self.held is None:
+            return None
+        known, mask = self.held
+        return observe(known, mask.repeat(3, axis=-1), self.predictor.schedule, noise, basis=self.predictor.basis)
 
     def best_seeds(self, seeds: Sequence[int], levels: Sequence[int]) -> list[int]:
         """For each window the best of several: after these levels whole, moving, then nearest to the mean of all."""
         count, layout = self.sampling.best_of, self.predictor.layout
         condition, pose = (part.repeat(count, axis=0) for part in (self.condition, self.pose))
         tried = [candidate_seeds(seed, count) for seed in seeds]
-        several = replace(self, condition=condition, pose=pose)
+        held = None if self.held is None else (self.held[0].repeat(count, axis=0), self.held[1].repeat(count, axis=0))
+        several = replace(self, condition=condition, pose=pose, held=held)
         [last] = deque(several.walk([seed for one in tried for seed in one], levels), maxlen=1)
         features = self.predictor.to_features(last.clean, pose)
         chosen = []
@@ -132,6 +148,12 @@ class _Windows:
                 ranks = liveliness_ranks(layout.decode(own, Place(np.zeros(3), np.zeros(()))))
             chosen.append(candidates[index_of_smallest([(*rank, far) for rank, far in zip(ranks, away, strict=True)])])
         return chosen
+
+
+def _leading(mask: np.ndarray) -> np.ndarray:
+    """Of masks (rows, frames, parts) the first frames of which everything is known, and nothing behind them."""
+    whole = np.cumprod((mask >= 1).all(axis=-1), axis=1)
+    return mask * whole[..., None].astype(mask.dtype)
 
 
 def join_known(sampled: np.ndarray, known: np.ndarray, mask: np.ndarray, *, ease: int) -> np.ndarray:
@@ -350,6 +372,8 @@ class WindowSampler:
             frames=frames,
             sampling=replace(self.sampling, temperature=min(self.sampling.temperature * livelier, 2.0)),
         )
+        if not self.predictor.layout.root:
+            return positions  # the root stays, so that there is no floor to stand on
         lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -MOST_SUNK)  # who is lower already stays there
         under = (lowest[:, None] - positions[..., 1].min(axis=-1)).clip(0)
         ease = max(round(RISE * self.predictor.fps), 1)

@@ -7,6 +7,7 @@ can arrive at one.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from typing import Literal, Unpack
 
@@ -27,6 +28,7 @@ from motionloom.requests.tasks import DAY
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import CONTEXT, FUTURES, Known, Past, WindowSampler, window_count
+from motionloom.tasks.other_joints import arrive, future_pieces, on_joints_of, sees_person
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
     apply_positions,
@@ -70,6 +72,9 @@ def predict(
 ) -> list[Motion]:
     """Motions that begin with the past, bit for bit, and go on for ``seconds``: futures, 10 without a ``count``.
 
+    A predictor of other joints than the 22, such as a published one of Human3.6M, gives motions of those joints at its
+    own rate: they begin with the past as it is on them, and the person stays where the past ends (`other_joints`).
+
     Args:
         predictor: from `Predictor.load`.
         past: of one person, two frames or more, on any humanoid skeleton (`motionloom.retarget`) and at any rate; the
@@ -88,6 +93,9 @@ def predict(
     chosen = PredictionSampling.of(sampling, settings)
     count = chosen.number(FUTURES)
     _check(predictor, past.fps, seconds, count=count, sampling=chosen, longest=WHOLE)
+    if not sees_person(predictor):
+        how = _OtherJoints(predictor, past, seconds, hold, chosen)
+        return how.futures(chosen.numbers(FUTURES), progress)
     history = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
     parts = prepare_hold(history, hold, seconds) if hold else None
@@ -128,6 +136,10 @@ def predict_pieces(
     """
     chosen = PredictionSampling.of(sampling, settings).alone()
     _check(predictor, past.fps, seconds, count=1, sampling=chosen, longest=DAY)
+    if not sees_person(predictor):
+        how = _OtherJoints(predictor, past, seconds, hold, chosen)
+        yield from chain([how.past], (one for [one] in how.pieces([number])))
+        return
     history = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
     parts = prepare_hold(history, hold, seconds) if hold else None
@@ -172,11 +184,14 @@ def switch(
     chosen = PredictionSampling.of(sampling, settings)
     chosen = replace(chosen, count=chosen.number())
     _check(predictor, past.fps, seconds, count=chosen.number(), sampling=chosen, longest=WHOLE)
-    check_like(past, target, "target")
+    if sees_person(predictor):
+        check_like(past, target, "target")
     if facing not in ("turned", "kept"):
         raise MotionloomError(f"facing is 'turned' or 'kept'; got {facing!r}")
     if len(target) < 2:
         raise MotionloomError(f"the target has {len(target)} frame; at least 2 are needed to arrive at it")
+    if not sees_person(predictor):
+        return _switch_other_joints(predictor, past, target, seconds=seconds, turn=facing == "turned", sampling=chosen)
     gap = max(round(seconds * past.fps), 1)
     near = int(ARRIVAL * (predictor.frames - predictor.observed) / predictor.fps * past.fps)
     free = max(gap - max(near, 1), 0)
@@ -189,6 +204,58 @@ def switch(
     return [
         _arrive(sampler, one, target, gap - free, number=i, facing=facing, foot_lock=foot_lock)
         for i, one in enumerate(pasts, start=chosen.first)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _OtherJoints:
+    """A request of a predictor of other joints than the 22, its past on those joints and at its rate."""
+
+    predictor: Predictor
+    clip: Motion
+    seconds: float
+    hold: FixedJoints | None
+    sampling: PredictionSampling
+
+    @cached_property
+    def past(self) -> Motion:
+        return on_joints_of(self.predictor, self.clip)
+
+    def pieces(self, numbers: Sequence[int]) -> Iterator[list[Motion]]:
+        past, hold = self.past, self.hold
+        if hold:
+            source = on_joints_of(self.predictor, hold.source, skeleton=past.skeleton)
+            hold = replace(hold, source=source)
+            _check_parts(hold, self.seconds)
+        total = max(round(self.seconds * past.fps), 1)
+        yield from future_pieces(self.predictor, past, total=total, numbers=numbers, hold=hold, sampling=self.sampling)
+
+    def futures(self, numbers: Sequence[int], progress: Progress | None) -> list[Motion]:
+        motions, count = [[self.past] for _ in numbers], window_count(self.predictor, self.seconds)
+        for done, pieces in enumerate(self.pieces(numbers), start=1):
+            for motion, piece in zip(motions, pieces, strict=True):
+                motion.append(piece)
+            if progress:
+                progress(done, count)
+        return [concatenate(*parts) for parts in motions]
+
+
+def _switch_other_joints(
+    predictor: Predictor, past: Motion, target: Motion, *, seconds: float, turn: bool, sampling: PredictionSampling
+) -> list[Motion]:
+    past = on_joints_of(predictor, past)
+    target = on_joints_of(predictor, target, skeleton=past.skeleton)
+    gap = max(round(seconds * past.fps), 1)
+    room = predictor.frames - predictor.observed
+    free = max(gap - max(int(ARRIVAL * room), 1), 0)
+    numbers = range(sampling.first, sampling.first + sampling.number())
+    motions = [past for _ in numbers]
+    if free:
+        motions = predict(predictor, past, seconds=free / past.fps, sampling=sampling)
+    sampler, shown = WindowSampler(predictor, replace(sampling, first=0)), max(round(TARGET * predictor.fps), 2)
+    return [
+        arrive(sampler, one, target, gap=gap - free, number=i, turn=turn, shown=shown)
+        for i, one in zip(numbers, motions, strict=True)
     ]
 
 
@@ -260,11 +327,6 @@ def _check(
 ) -> None:
     if not isinstance(predictor, Predictor):
         raise MotionloomError(f"motion is predicted by a Predictor; got a {type(predictor).__name__}: load one")
-    if predictor.layout.names != SMPL_LAYOUT.names or not predictor.layout.root:
-        raise MotionloomError(
-            f"this predictor sees {predictor.layout.joints} joints of a benchmark's skeleton; motions of users need "
-            "one that sees the 22 joints and their way, such as the shipped one"
-        )
     if not (np.isfinite(seconds) and 0 < seconds <= longest) or round(seconds * fps) < 1:
         raise MotionloomError(
             f"cannot predict {seconds:g} s; ask for at least a frame ({1 / fps:.3g} s) and at most {longest:g} s"
