@@ -4,6 +4,7 @@ import type { Actions } from "../app/actions";
 import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
+import { TOUCH, withKey } from "../app/keys";
 import type { Fan } from "../app/session";
 import { type Clip, type Project, CHANGED, NO_CONSTRAINTS, keptTake } from "../project/model";
 import { GHOSTS } from "../stage/theme";
@@ -15,7 +16,7 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
     app.project.change(`keep take ${index + 1}`, (old) => (old.kept === index ? old : { ...old, kept: index }));
   const deed = (key: string, text: string, disabled = false) =>
     textButton(text, actions[key]!.run, {
-      title: `${actions[key]!.label} (${shownKey(actions[key]!.keys[0]!)})`,
+      title: withKey(actions[key]!.label, shownKey(actions[key]!.keys[0]!)),
       disabled,
     });
   const none = !project.takes.length;
@@ -50,7 +51,11 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
         `The two are in each other by up to ${Math.round(deepest(project) * 100)} cm: red on the ruler.`,
       ),
     clips.length > 1 &&
-      h("div", { class: "row" }, textButton("Side by side", actions.beside!.run, { pressed: sideBySide, title: "B" })),
+      h(
+        "div",
+        { class: "row" },
+        textButton("Side by side", actions.beside!.run, { pressed: sideBySide, title: withKey("All takes", "B") }),
+      ),
     h(
       "div",
       { class: "row wrap" },
@@ -75,7 +80,7 @@ export function fanSection(app: App, deeds: Deeds, fan: Fan): HTMLElement {
     h(
       "p",
       { class: "quiet" },
-      "Each ghost is a future of this motion. Choose one with its number, or leave with Escape.",
+      `Each ghost is a future of this motion. Choose one${TOUCH ? "." : " with its number, or leave with Escape."}`,
     ),
     h(
       "div",

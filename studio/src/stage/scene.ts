@@ -10,6 +10,9 @@ import type { StageTheme } from "./theme";
 /** The layer of what is there to be dragged, which no film shows. */
 export const HANDLES = 1;
 
+/** The part of the picture's height that people with raised hands take. */
+const PEOPLE = 0.8;
+
 /** Frames slower than this for a while make the picture coarser. */
 const SLOW = 45;
 const PATIENCE = 12;
@@ -41,7 +44,7 @@ export class Scene {
   private isCoarse = false;
   private readonly pending: Pending;
   private next = 0;
-  private lifted = 0;
+  private covered = 0;
   private theme: StageTheme;
   private backdrop = NONE;
   private picture: THREE.Texture | null = null;
@@ -106,9 +109,9 @@ export class Scene {
     this.renderer.forceContextLoss();
   }
 
-  /** Show the middle of the picture so many pixels higher, where something lies over what is below. */
-  lift(pixels: number): void {
-    this.lifted = pixels;
+  /** Show the people above something that lies over so many pixels at the bottom, smaller if they need it. */
+  showAbove(pixels: number): void {
+    this.covered = pixels;
     this.resize();
   }
 
@@ -291,8 +294,12 @@ export class Scene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     if (this.picture) cover(this.picture, width / height);
-    const [right, up] = this.filmed ? [0, 0] : [(this.besides * width) / 2, this.lifted];
-    if (right || up) this.camera.setViewOffset(width, height, right, up, width, height);
+    const free = this.filmed ? height : height - Math.min(this.covered, height / 2);
+    const size = Math.min(1, free / (PEOPLE * height));
+    const [wide, high] = [width * size, height * size];
+    const right = this.filmed ? 0 : (wide - width + this.besides * width) / 2;
+    const up = (high - free) / 2;
+    if (right || up || size < 1) this.camera.setViewOffset(wide, high, right, up, width, height);
     else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.invalidate();
