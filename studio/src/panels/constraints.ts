@@ -11,6 +11,7 @@ import { changePoint, changeTarget, removePose, removeTarget, setPath, setSpeed 
 import { FLYING, UNMET, isMeasurable, pathMiss, poseMiss, targetLift, targetMiss } from "../project/misses";
 import { type Person, type Project, length, round } from "../project/model";
 import { pathLength, timed } from "../project/path";
+import { fights } from "../project/tracks";
 import { miss, numberField, section, textButton, wrong } from "./parts";
 
 /** Centimetres beyond which a path counts as missed. */
@@ -141,6 +142,7 @@ function targetPanel({ app, project, person, who }: PersonContext): HTMLElement 
   return section(
     "Targets",
     wrong(app, "target"),
+    ...fights(person).map((line) => h("p", { class: "remark", role: "note" }, line)),
     h(
       "ul",
       { class: "list" },

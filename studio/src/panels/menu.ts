@@ -26,7 +26,7 @@ export function menu(
       "div",
       { class: "sheet" },
       ...rows.flatMap(({ key, action }) => [
-        goal(key) && h("h3", {}, goal(key)),
+        goal(key) && h("p", { class: "goal" }, goal(key)),
         h(
           "button",
           {

@@ -43,7 +43,10 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
         ),
       ),
     ),
-    ...(project.takes[project.kept]?.told ?? []).map((one) => h("p", { class: "quiet told" }, one)),
+    obedience(project, actions),
+    ...(keptTake(project)?.told ?? [])
+      .filter((one) => !MISSED.test(one))
+      .map((one) => h("p", { class: "quiet told" }, one)),
     deepest(project) > 0 &&
       h(
         "p",
@@ -66,6 +69,33 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
       deed("loop", "Loop", none),
       deed("aside", "Put aside", none),
     ),
+  );
+}
+
+/** What of the words was looked for and is not in the motion, as the server says it. */
+const MISSED = /^not found in \d+ attempts?: (.+)$/;
+
+/** Whether what the words say plainly is seen in the kept take; of others, such as clips, nothing is said. */
+function obedience(project: Project, actions: Actions): HTMLElement | false {
+  const take = keptTake(project);
+  const told = take?.told ?? [];
+  const missed = told.map((one) => MISSED.exec(one)?.[1]).find((one) => one !== undefined);
+  if (missed !== undefined) {
+    const more =
+      project.count === 4 ? textButton("Draw again?", actions.draw!.run) : textButton("Four takes?", actions.four!.run);
+    return h(
+      "div",
+      { class: "row wrap seen" },
+      h("b", { class: "badge not" }, "Not seen"),
+      h("span", { class: "grow" }, missed),
+      more,
+    );
+  }
+  const isWhole = take?.how === "drawn" && !take.notes?.length && told.length > 0 && told.length <= take.people;
+  const title = "Nothing that the words say plainly is missing";
+  return (
+    isWhole &&
+    h("div", { class: "row seen" }, h("b", { class: "badge", title }, "Seen"), h("span", {}, "what the words ask for"))
   );
 }
 

@@ -17,7 +17,7 @@ import {
   newId,
   round,
 } from "../project/model";
-import { ORDER, PARTS, SMOOTH, SMOOTHEST, type Part, addTrack, changeTrack } from "../project/tracks";
+import { ORDER, PARTS, SMOOTH, SMOOTHEST, type Part, addTrack, changeTrack, fights } from "../project/tracks";
 import { numberField, section, textButton, wordsArea } from "./parts";
 
 /** Seconds where neither a stretch is marked nor a block selected. */
@@ -145,6 +145,7 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
         { min: 0.05, max: SMOOTHEST },
       ),
     ...notes.map(({ line }) => h("p", { class: "remark", role: "note" }, line)),
+    ...fights(value.people[who]!, { track: track.id }).map((line) => h("p", { class: "remark", role: "note" }, line)),
     h(
       "div",
       { class: "pair" },

@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { type Backdrop, NONE, cover, textureOf } from "./backdrop";
 import { Floor } from "./floor";
+import type { Vec3 } from "../project/model";
 import { Pending } from "./pending";
 import type { StageTheme } from "./theme";
 
@@ -153,6 +154,7 @@ export class Scene {
   centre(x: number, z: number, follow: boolean, ease: number): void {
     this.sun.position.set(x + 2.4, 5.2, z + 2.2);
     this.sun.target.position.set(x, 0, z);
+    this.floor.centre(x, z);
     if (!follow) return;
     const step = new THREE.Vector3(x - this.orbit.target.x, 0, z - this.orbit.target.z).multiplyScalar(ease);
     if (step.lengthSq() < 1e-10) return;
@@ -234,7 +236,13 @@ export class Scene {
     );
   }
 
+  /** Where feet are, under which the floor is darker. */
+  stand(feet: readonly Vec3[]): void {
+    this.floor.stand(feet);
+  }
+
   private draw(): void {
+    this.floor.face(this.yaw());
     if (this.paint) this.paint();
     else this.renderer.render(this.scene, this.camera);
   }
@@ -315,7 +323,7 @@ function sunlight(): THREE.DirectionalLight {
   const sun = new THREE.DirectionalLight("#fff6e8", 2);
   sun.castShadow = true;
   sun.shadow.mapSize.set(2048, 2048);
-  sun.shadow.radius = 5;
+  sun.shadow.radius = 9;
   sun.shadow.bias = -0.0005;
   sun.shadow.normalBias = 0.02;
   const view = sun.shadow.camera;
