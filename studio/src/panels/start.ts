@@ -2,6 +2,7 @@
 
 import type { App } from "../app/app";
 import { h } from "../app/dom";
+import { withKey } from "../app/keys";
 import type { Projects } from "../app/projects";
 import { CHIPS } from "../project/chips";
 import { hasWords } from "../project/model";
@@ -24,7 +25,7 @@ export function startCard(app: App, projects: Projects, root: HTMLElement, showA
       "header",
       {},
       h("h2", {}, "What should the person do?"),
-      h("button", { class: "cross", "aria-label": "Close", title: "Close (Esc)", onclick: close }, "×"),
+      h("button", { class: "cross", "aria-label": "Close", title: withKey("Close", "Esc"), onclick: close }, "×"),
     ),
     h(
       "form",

@@ -2,6 +2,7 @@
 
 import { type App, shownClip } from "../app/app";
 import { h } from "../app/dom";
+import { withKey } from "../app/keys";
 import { chosenBlocks } from "../app/session";
 import { facingAt, jointAt } from "../body/clip";
 import { HEAD } from "../body/skeleton";
@@ -159,7 +160,7 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
         ),
       ),
     ),
-    h("div", { class: "row" }, textButton("Delete", remove, { title: "Delete these words (Del)" })),
+    h("div", { class: "row" }, textButton("Delete", remove, { title: withKey("Delete these words", "Del") })),
   );
 }
 
