@@ -302,7 +302,7 @@ export class Scene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     if (this.picture) cover(this.picture, width / height);
-    const free = this.filmed ? height : height - Math.min(this.covered, height / 2);
+    const free = this.filmed ? height : height - Math.min(this.covered, height * 0.7);
     const size = Math.min(1, free / (PEOPLE * height));
     const [wide, high] = [width * size, height * size];
     const right = this.filmed ? 0 : (wide - width + this.besides * width) / 2;
