@@ -72,14 +72,19 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
   );
 }
 
+/** Seconds of the longest motion in which the words are looked for. */
+const LOOKED = 120;
+
 /** What of the words was looked for and is not in the motion, as the server says it. */
-const MISSED = /^not found in \d+ attempts?: (.+)$/;
+const MISSED = /^not seen: (.+)$/;
 
 /** Whether what the words say plainly is seen in the kept take; of others, such as clips, nothing is said. */
 function obedience(project: Project, actions: Actions): HTMLElement | false {
   const take = keptTake(project);
   const told = take?.told ?? [];
-  const missed = told.map((one) => MISSED.exec(one)?.[1]).find((one) => one !== undefined);
+  const lines = [...told, ...(take?.notes ?? []).map((one) => one.line)];
+  const found = lines.map((one) => MISSED.exec(one)?.[1]).filter((one) => one !== undefined);
+  const missed = found.length ? [...new Set(found)].join(", ") : undefined;
   if (missed !== undefined) {
     const more =
       project.count === 4 ? textButton("Draw again?", actions.draw!.run) : textButton("Four takes?", actions.four!.run);
@@ -91,7 +96,8 @@ function obedience(project: Project, actions: Actions): HTMLElement | false {
       more,
     );
   }
-  const isWhole = take?.how === "drawn" && !take.notes?.length && told.length > 0 && told.length <= take.people;
+  const isWhole =
+    take?.how === "drawn" && !take.notes?.length && told.length === 1 && take.people === 1 && take.seconds <= LOOKED;
   const title = "Nothing that the words say plainly is missing";
   return (
     isWhole &&
