@@ -17,7 +17,7 @@ import { Drawer } from "./app/drawing";
 import { remember, remembered } from "./app/memory";
 import { Files } from "./app/files";
 import { Saver, restored } from "./app/saving";
-import { keyOf } from "./app/keys";
+import { TOUCH, keyOf } from "./app/keys";
 import { Live, type LiveState } from "./app/live";
 import { Projects } from "./app/projects";
 import { newSession } from "./app/session";
@@ -33,8 +33,9 @@ import { drops, help, notices, takeNames } from "./panels/overlays";
 import { palette } from "./panels/palette";
 import { historyPictures, nameDialog, recentProjects } from "./panels/pictures";
 import { splits } from "./panels/splits";
-import { startCard } from "./panels/start";
+import { promptBar, startCard } from "./panels/start";
 import { History } from "./project/history";
+import { renamed } from "./project/model";
 import { Stage } from "./stage/stage";
 import { listen } from "./timeline/gestures";
 import { TimelineView } from "./timeline/view";
@@ -57,7 +58,7 @@ async function start(): Promise<void> {
   setTheme(localStorage.getItem(THEME) ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
   const begin = await restored();
   const app: App = {
-    project: new History(begin.project, await remembered(begin.stamp.id, begin.project)),
+    project: new History(begin.project, await remembered(begin.stamp.id, begin.project), renamed),
     session: newSession(),
     denoising: new Signal<readonly MotionClip[]>([]),
     live: new Signal<LiveState | null>(null),
@@ -101,6 +102,8 @@ async function start(): Promise<void> {
   drawer.loadTakes();
   drawer.schedule();
   app.session.update({ playing: begin.isNew || app.project.value.takes.length > 0, welcome: begin.isNew });
+  // Who comes back and types, writes: no letter acts before somebody has gone to work.
+  if (!begin.isNew && !TOUCH) part("prompt").querySelector("input")!.focus({ preventScroll: true });
   document.body.dataset.ready = "true";
   performance.mark("ready");
 }
@@ -129,7 +132,8 @@ function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
   jointDialog(app, files);
   filmDialog(app, stage);
   backdropDialog(app, stage.scene);
-  startCard(app, projects, part("start"), (pixels) => stage.scene.lift(pixels));
+  startCard(app, projects, part("start"), (pixels) => stage.scene.showAbove(pixels));
+  promptBar(app, projects, part("prompt"));
   splits();
   listen(app, timeline, part("tracks"));
   const busy = () => {
@@ -140,7 +144,8 @@ function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
   app.session.subscribe(busy);
   busy();
   part("tracks").addEventListener("click", (event) => {
-    if ((event.target as Element).closest("[data-act=add]")) all.add!.run();
+    const act = (event.target as Element).closest<HTMLElement>("[data-act]")?.dataset.act;
+    if (act) all[act]!.run();
   });
   const byKey = new Map(Object.values(all).flatMap((action) => action.keys.map((key) => [key, action] as const)));
   addEventListener("keydown", (event) => {
@@ -166,11 +171,15 @@ function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
 /** What can be done in live mode besides steering. */
 const LIVE_TOO = ["live", "follow", "above", "theme", "help"];
 
+/** Keys that write nothing into an empty field, and take nothing out of it. */
+const WRITES_NOTHING = /^( |Arrow\w+|Page\w+|Home|End|F1)$/;
+
 /** Keys belong to the field that is written in, but for undo and whatever else goes with Ctrl and is no editing. */
 function isTyping(event: KeyboardEvent): boolean {
   const { target } = event;
   if (!(target instanceof HTMLElement) || !target.matches("input, textarea, select")) return false;
   if (target.closest("[hidden], dialog:not([open])")) return false;
+  if (target.closest("#prompt") && !(target as HTMLInputElement).value && WRITES_NOTHING.test(event.key)) return false;
   return !(event.ctrlKey || event.metaKey) || "acvx".includes(event.key.toLowerCase());
 }
 

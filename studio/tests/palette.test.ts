@@ -23,6 +23,11 @@ describe("the palette", () => {
     expect(names("joints")).toEqual(["Export BVH"]);
     expect(names("(")).toEqual([]);
   });
+
+  it("finds actions by the words of other programs", () => {
+    const also = { ...action("Export GLB"), also: "unity fbx" };
+    expect(matchingActions([...ALL, also], "unity").map((one) => one.label)).toEqual(["Export GLB"]);
+  });
 });
 
 describe("markers", () => {

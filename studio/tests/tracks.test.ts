@@ -4,7 +4,16 @@ import { type Project, type Take, exampleProject } from "../src/project/model";
 import { plan } from "../src/project/plan";
 import { withFixedTake } from "../src/project/fixedTake";
 import { freeze, setPeople } from "../src/project/timeline";
-import { PARTS, addTrack, changeTrack, shiftTrack, trackCommands, trackKeys, trackText } from "../src/project/tracks";
+import {
+  PARTS,
+  addTrack,
+  changeTrack,
+  fights,
+  shiftTrack,
+  trackCommands,
+  trackKeys,
+  trackText,
+} from "../src/project/tracks";
 
 const TAKE: Take = { motion: "old", seed: 1, seconds: 6.5, people: 1, how: "drawn" };
 
@@ -85,5 +94,18 @@ describe("a part with words of its own", () => {
     expect(trackCommands(waving(), "a")).toEqual([
       "edit a.npz 'it'\\''s waving' --keep lower_body --keep torso --keep head_neck --keep left_arm --between 1 3 --seed 1 --out a_1.npz",
     ]);
+  });
+});
+
+describe("a target and a part that want the same joint", () => {
+  it("are said with who wins, as long as they meet in time", () => {
+    const target = { id: "w", joint: 21, time: 1.2, until: null, position: [0, 1, 0] as const };
+    const waves = waving(1, 3);
+    const person = { ...waves.people[0]!, targets: [target] };
+    expect(fights(person)).toHaveLength(1);
+    expect(fights(person)[0]).toContain("wins");
+    expect(fights({ ...person, targets: [{ ...target, joint: 20 }] })).toEqual([]);
+    expect(fights({ ...person, targets: [{ ...target, time: 3.5 }] })).toEqual([]);
+    expect(fights({ ...person, targets: [{ ...target, time: 0.2, until: 1.5 }] })).toHaveLength(1);
   });
 });

@@ -22,6 +22,7 @@ import type { Drawer } from "./drawing";
 import type { Files } from "./files";
 import type { Live } from "./live";
 import { exports, projects, windows } from "./projectActions";
+import { ALSO } from "./synonyms";
 import type { Projects } from "./projects";
 import { NOTHING, type Session, type Tool, blocksChosen, chosenBlocks } from "./session";
 
@@ -35,6 +36,8 @@ export interface Action {
   readonly note?: string;
   /** Whether it can be done at the moment, where that is not always so. */
   readonly isThere?: () => boolean;
+  /** Other words for it, by which the palette finds it. */
+  readonly also?: string;
 }
 
 /** Poses that are put between two. */
@@ -64,7 +67,7 @@ export function actions(parts: Parts): Actions {
   const keys = all.flatMap(([, action]) => action.keys);
   const twice = [all.map(([name]) => name), keys].flatMap((each) => each.filter((one, at) => each.indexOf(one) < at));
   if (twice.length) throw new Error(`two actions have the name or key ${twice.join(", ")}`);
-  return Object.fromEntries(all);
+  return Object.fromEntries(all.map(([name, action]) => [name, { ...action, also: ALSO[name] ?? "" }]));
 }
 
 function play({ app }: Parts): Actions {

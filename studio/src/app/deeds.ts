@@ -22,6 +22,7 @@ import { freeze, freezeRest, unfrozen, write } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
 import { type App, fail, shownClip } from "./app";
 import type { Drawer } from "./drawing";
+import { TOUCH } from "./keys";
 import { NOTHING } from "./session";
 
 const FUTURES = 5;
@@ -48,7 +49,9 @@ export class Deeds {
     const at = begins(segments);
     const stretch = range ?? (index >= 0 ? ([at[index]!, at[index + 1]!] as const) : null);
     if (!stretch)
-      return this.say("Mark a stretch on the ruler with Shift and drag, or select a block; then freeze it.");
+      return this.say(
+        `${TOUCH ? "Select" : "Mark a stretch on the ruler with Shift and drag, or select"} a block; then freeze it.`,
+      );
     await this.drawer.finished();
     this.app.project.change("freeze a stretch", (old) => freeze(old, stretch));
     this.app.session.update({ range: null });
@@ -188,14 +191,17 @@ export class Deeds {
   copyPose(): void {
     const pose = this.poseAtHand();
     if (!pose) return this.say("There is no pose yet; draw a motion first.");
-    this.app.session.update({ pose, told: "The pose is copied; Alt V keyframes it at the playhead." });
+    this.app.session.update({
+      pose,
+      told: `The pose is copied; ${TOUCH ? "Paste" : "Alt V"} keyframes it at the playhead.`,
+    });
   }
 
   /** Ask for the copied pose at the playhead, where the person is then and as they face. */
   pastePose(): void {
     const { pose, time, person } = this.app.session.value;
     const clip = shownClip(this.app);
-    if (!pose) return this.say("No pose is copied yet; copy one with Alt C.");
+    if (!pose) return this.say("No pose is copied yet; copy one first.");
     const [x, , z] = clip ? jointAt(clip, person, 0, time) : pose[0]!;
     const positions = clip ? turnedTo(pose, [x, z], facingAt(clip, person, time)) : pose;
     this.putPose("pasted pose", positions, "paste a pose");

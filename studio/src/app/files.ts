@@ -48,7 +48,10 @@ export class Files {
   async open(files: readonly File[]): Promise<void> {
     // A skeleton goes before the motions that need it.
     for (const file of [...files].sort((a, b) => Number(isAsf(b)) - Number(isAsf(a)))) {
+      const reading = `Reading ${file.name} …`;
+      this.app.session.update({ told: reading });
       await this.report(file.name, () => this.openOne(file));
+      if (this.app.session.value.told === reading) this.app.session.update({ told: null });
     }
   }
 
@@ -97,7 +100,7 @@ export class Files {
     const name = file.name.toLowerCase();
     if (name.endsWith(".json")) return this.projects.add(read(await file.text()));
     if (name.endsWith(".yaml") || name.endsWith(".yml")) return this.openTimeline(file);
-    if (name.endsWith(".vrm")) return this.character(file);
+    if (name.endsWith(".vrm")) return void (await this.character(file));
     if (isAsf(file)) {
       this.asf = (await uploadMotion(file)).id;
       return;
@@ -105,11 +108,26 @@ export class Files {
     if (!MOTIONS.some((suffix) => name.endsWith(suffix))) {
       throw new Error(`this page opens ${MOTIONS.join(" ")} .vrm .yaml and ${SUFFIX} files.`);
     }
-    const { hasMotion, hasBody } = name.endsWith(".glb")
-      ? await glbContents(file)
-      : { hasMotion: true, hasBody: false };
-    if (hasBody) await this.character(file);
-    if (hasMotion) this.deeds.addClip(await uploadMotion(file, name.endsWith(".amc") ? this.asf : null), file.name);
+    if (name.endsWith(".glb")) return this.openGlb(file);
+    this.deeds.addClip(await uploadMotion(file, name.endsWith(".amc") ? this.asf : null), file.name);
+  }
+
+  /** A body becomes the character, a motion a clip; somebody is told of what is not in the file. */
+  private async openGlb(file: File): Promise<void> {
+    const { hasMotion, hasBody, hasMesh } = await glbContents(file);
+    if (!hasMotion && !hasBody)
+      throw new Error(
+        hasMesh
+          ? "there is a body in it, but no skeleton that could move it; export it with its armature and its weights."
+          : "there is neither a body nor a motion in it; export a character with its armature, or an animation.",
+      );
+    if (hasBody && !(await this.character(file))) return;
+    if (!hasMotion) return;
+    this.deeds.addClip(await uploadMotion(file), file.name);
+    if (!hasBody)
+      this.app.session.update({
+        told: `There is no body in ${file.name}, so the person on the stage stays; its motion is among the clips.`,
+      });
   }
 
   /** Use the refused character with the joints that somebody named; gives the sentence of what is wrong with them. */
@@ -124,13 +142,16 @@ export class Files {
     }
   }
 
-  private async character(file: File): Promise<void> {
+  /** Use a character; false: somebody is asked which of its joints is which. */
+  private async character(file: File): Promise<boolean> {
     try {
       await this.take(file);
+      return true;
     } catch (error) {
       const { joints, guesses } = (error instanceof Refused ? error.about : {}) as Partial<Unnamed>;
       if (!joints || !guesses) throw error;
       this.app.session.update({ unnamed: { file, joints, guesses }, dialog: "joints" });
+      return false;
     }
   }
 
@@ -179,8 +200,8 @@ export function saveFile(project: Project, stamp: Stamp, more = ""): void {
   download(data, `${fileName(project.name)}${more}${SUFFIX}`);
 }
 
-/** Whether a GLB moves, and whether it has a skin. */
-async function glbContents(file: File): Promise<{ hasMotion: boolean; hasBody: boolean }> {
+/** Whether a GLB moves, whether it has a body on joints, by weights or piece by piece, and whether it has any mesh. */
+async function glbContents(file: File): Promise<{ hasMotion: boolean; hasBody: boolean; hasMesh: boolean }> {
   const head = new DataView(await file.slice(0, 20).arrayBuffer());
   if (head.byteLength < 20 || head.getUint32(0, true) !== GLB_MAGIC)
     throw new Error("it is no GLB file; its first bytes are not 'glTF'.");
@@ -191,10 +212,9 @@ async function glbContents(file: File): Promise<{ hasMotion: boolean; hasBody: b
   } catch {
     throw new Error("it is no GLB file: its description cannot be read; export it again.");
   }
-  return {
-    hasMotion: Boolean(found.animations?.length),
-    hasBody: Boolean(found.skins?.length && found.meshes?.length),
-  };
+  const hasMotion = Boolean(found.animations?.length);
+  const hasMesh = Boolean(found.meshes?.length);
+  return { hasMotion, hasBody: hasMesh && (hasMotion || Boolean(found.skins?.length)), hasMesh };
 }
 
 /** The name of a project as that of a file. */

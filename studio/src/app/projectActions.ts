@@ -9,17 +9,17 @@ import type { Dialog } from "./session";
 type Written = readonly [string, string, readonly string[], Format | "share" | "yaml", string];
 
 const EXPORTS: Readonly<Record<string, Written>> = {
-  export: ["BVH", "Export BVH", ["E"], "bvh", "Motion on the 22 joints, or on your character"],
+  export: ["BVH", "Export BVH", ["E"], "bvh", "Blender, Unreal, MotionBuilder; on the 22 joints, or on your character"],
   exportGlb: [
     "GLB",
     "Export GLB",
     ["Shift+E"],
     "glb",
-    "For Blender, Godot and the web; on your character if there is one",
+    "Godot, Unity (with a glTF importer), Blender, the web; on your character if there is one",
   ],
   exportMp4: ["MP4", "Export a film (MP4)", [], "mp4", "A film"],
   exportPng: ["PNG", "Export a sheet of poses (PNG)", [], "png", "A sheet of poses"],
-  exportNpz: ["NPZ", "Export numbers (NPZ)", [], "npz", "Numbers for Python"],
+  exportNpz: ["NPZ", "Export numbers (NPZ)", [], "npz", "Numbers for Python and robots"],
   share: [
     "Share",
     "Share as a web page",
@@ -48,8 +48,19 @@ export function exportName(key: string): string {
   return EXPORTS[key]?.[0] ?? (key === "film" ? "Film of the stage" : "Project file");
 }
 
-/** In the order of the menu. */
-export const EXPORT_KEYS = [...Object.keys(EXPORTS), "film", "save"];
+/** In the order of the menu: each goal with its exports. */
+const GOALS: Readonly<Record<string, readonly string[]>> = {
+  "Into an engine or Blender": ["export", "exportGlb"],
+  "To look at, and to send": ["share", "shareOwn", "exportMp4", "film", "exportPng"],
+  "Into a program, and to go on with": ["exportNpz", "exportYaml", "save"],
+};
+
+export const EXPORT_KEYS = Object.values(GOALS).flat();
+
+/** The goal that begins with this export; empty: none does. */
+export function exportGoal(key: string): string {
+  return Object.entries(GOALS).find(([, [first]]) => first === key)?.[0] ?? "";
+}
 
 export function exports({ app, files }: Parts): Actions {
   const film: Action = {

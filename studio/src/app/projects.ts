@@ -1,13 +1,11 @@
 /** New, open, recent, save as: the folder holds several projects, and none is overwritten. */
 
-import { type Project, blankProject, segment } from "../project/model";
+import { type Project, blankProject, hasWords, length, segment } from "../project/model";
+import { addSegment } from "../project/timeline";
 import { type ProjectRow, blocksOf, projectRows } from "../server/api";
 import { type App, fail } from "./app";
 import type { Drawer } from "./drawing";
 import type { Saver } from "./saving";
-
-/** Letters of a sentence that name its project. */
-const NAMED = 40;
 
 export class Projects {
   constructor(
@@ -46,7 +44,6 @@ export class Projects {
       this.app.session.update({ welcome: false, time: 0, playing: true, selection: { kind: "none" } });
       this.app.project.change("say what happens", (old) => ({
         ...old,
-        name: old.name === blankProject().name ? Array.from(sentence.trim()).slice(0, NAMED).join("") : old.name,
         seed: seed ?? old.seed,
         segments: blocks.map((one) => segment(one.text, one.seconds)),
         frozen: [],
@@ -56,6 +53,25 @@ export class Projects {
     } catch (error) {
       fail(this.app, error);
     }
+  }
+
+  /** Put a sentence behind what is there, a block for each of its actions. */
+  async goOn(sentence: string): Promise<void> {
+    if (!hasWords(this.app.project.value)) return this.start(sentence);
+    try {
+      const blocks = await blocksOf(sentence);
+      this.app.session.update({ time: length(this.app.project.value), playing: true, selection: { kind: "none" } });
+      this.app.project.change("say what happens next", (old) =>
+        blocks.reduce((now, one) => addSegment(now, one.text, one.seconds), old),
+      );
+    } catch (error) {
+      fail(this.app, error);
+    }
+  }
+
+  /** Answer the first question in a project of its own. */
+  async startAnew(sentence: string): Promise<void> {
+    if (await this.blank()) await this.start(sentence);
   }
 
   private async replace(what: string, deed: () => Promise<void>, welcome = false): Promise<boolean> {

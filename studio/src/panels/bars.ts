@@ -3,7 +3,8 @@
 import type { Actions } from "../app/actions";
 import { type App, duration } from "../app/app";
 import { h, morph } from "../app/dom";
-import { EXPORT_KEYS, exportName } from "../app/projectActions";
+import { withKey } from "../app/keys";
+import { EXPORT_KEYS, exportGoal, exportName } from "../app/projectActions";
 import { chosenBlocks } from "../app/session";
 import { begins } from "../project/model";
 import { menu, menuHabits } from "./menu";
@@ -51,7 +52,7 @@ export function topBar(app: App, actions: Actions, root: HTMLElement): void {
       }),
       iconButton(actions.draw!, "draw"),
       iconButton(actions.four!, "grid", { pressed: value.count === 4, fold: true }),
-      menu(actions, EXPORT_KEYS, { title: "Export", strong: true, name: exportName }),
+      menu(actions, EXPORT_KEYS, { title: "Export", strong: true, name: exportName, goal: exportGoal }),
       iconButton(actions.palette!, "search"),
       iconButton(actions.panel!, "panel", { pressed: sheet, key: "panel" }),
       iconButton(actions.theme!, "theme", { fold: true }),
@@ -85,7 +86,7 @@ export function stageBar(app: App, actions: Actions, left: HTMLElement, right: H
               "button",
               {
                 class: `icon who who${person}`,
-                title: "Work on the other person (Q)",
+                title: withKey("Work on the other person", "Q"),
                 "aria-label": `Working on person ${person + 1}`,
                 onclick: actions.person!.run,
               },
@@ -126,7 +127,7 @@ export function transport(app: App, actions: Actions, root: HTMLElement): void {
         "button",
         {
           class: "text rate",
-          title: "Playback rate ([ and ])",
+          title: withKey("Playback rate", "[ and ]"),
           "aria-label": `Playback rate ${rate}`,
           onclick: () => app.session.update({ rate: rate >= 2 ? 0.25 : rate * 2 }),
         },
@@ -140,7 +141,7 @@ export function transport(app: App, actions: Actions, root: HTMLElement): void {
       h("span", { class: "rule" }),
       iconButton(actions.freeze!, "freeze", { disabled: !range && chosen < 0 }),
       textButton("Unfreeze", actions.unfreeze!.run, {
-        title: "Unfreeze everything (Shift Z)",
+        title: withKey("Unfreeze everything", "Shift Z"),
         disabled: !frozen.length,
       }),
       h("span", { class: "grow" }),
@@ -156,15 +157,18 @@ export function transport(app: App, actions: Actions, root: HTMLElement): void {
               : "",
       ),
       textButton(overwriting ? "Overwrite" : "Ripple", actions.overwriting!.run, {
-        title: overwriting
-          ? "A moved block lies over others, which stay when they are (Shift R)"
-          : "A moved block pushes the others aside (Shift R)",
+        title: withKey(
+          overwriting
+            ? "A moved block lies over others, which stay when they are"
+            : "A moved block pushes the others aside",
+          "Shift O",
+        ),
         pressed: overwriting,
       }),
-      textButton("Snap", actions.snapping!.run, { title: "Times catch on marks (M)", pressed: snapping }),
-      textButton("Fit", actions.fit!.run, { title: "Show the whole timeline (F)" }),
-      textButton("−", actions.zoomOut!.run, { title: "Zoom out (-)" }),
-      textButton("+", actions.zoomIn!.run, { title: "Zoom in (+)" }),
+      textButton("Snap", actions.snapping!.run, { title: withKey("Times catch on marks", "M"), pressed: snapping }),
+      textButton("Fit", actions.fit!.run, { title: withKey("Show the whole timeline", "F") }),
+      textButton("−", actions.zoomOut!.run, { title: withKey("Zoom out", "-") }),
+      textButton("+", actions.zoomIn!.run, { title: withKey("Zoom in", "+") }),
     ]);
     tick();
   };

@@ -4,12 +4,14 @@ import type { Actions } from "../app/actions";
 import { type App, shownClip } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
+import { TOUCH, withKey } from "../app/keys";
 import { NOTHING } from "../app/session";
 import { jointName } from "../body/skeleton";
 import { changePoint, changeTarget, removePose, removeTarget, setPath, setSpeed } from "../project/constraints";
 import { FLYING, UNMET, isMeasurable, pathMiss, poseMiss, targetLift, targetMiss } from "../project/misses";
 import { type Person, type Project, length, round } from "../project/model";
 import { pathLength, timed } from "../project/path";
+import { fights } from "../project/tracks";
 import { miss, numberField, section, textButton, wrong } from "./parts";
 
 /** Centimetres beyond which a path counts as missed. */
@@ -43,7 +45,7 @@ export function constraintPanels(context: PersonContext): HTMLElement[] {
       h(
         "p",
         { class: "quiet" },
-        "While stretches are frozen, only words are drawn; path and targets count again when everything is unfrozen (Shift Z).",
+        "While stretches are frozen, only words are drawn; path and targets count again when everything is unfrozen.",
       ),
     );
   return panels;
@@ -133,13 +135,14 @@ function targetPanel({ app, project, person, who }: PersonContext): HTMLElement 
       h(
         "p",
         { class: "quiet" },
-        "Go to a time, click a joint and drag its arrows. Arrow keys and Page Up or Down move it, too.",
+        `Go to a time, press a joint and drag its arrows.${TOUCH ? "" : " Arrow keys and Page Up or Down move it, too."}`,
       ),
     );
   const chosen = selection.kind === "target" ? person.targets.find((one) => one.id === selection.id) : undefined;
   return section(
     "Targets",
     wrong(app, "target"),
+    ...fights(person).map((line) => h("p", { class: "remark", role: "note" }, line)),
     h(
       "ul",
       { class: "list" },
@@ -253,16 +256,16 @@ function posePanel({ app, project, person, who, actions, deeds }: PersonContext)
         "p",
         { class: "quiet" },
         tool === "target"
-          ? "Drag its joints: Shift and click chooses several, which move together; Alt P pins what is to stay."
-          : "T, then drag its joints.",
+          ? `Drag its joints${TOUCH ? "" : ": Shift and click chooses several, which move together; Alt P pins what is to stay"}.`
+          : "Choose Joints, then drag its joints.",
       ),
     h(
       "div",
       { class: "row wrap" },
-      textButton("Keyframe this pose", actions.pose!.run, { title: "O" }),
-      textButton("Copy", actions.copyPose!.run, { title: "Copy the pose (Alt C)" }),
-      textButton("Paste", actions.pastePose!.run, { title: "Paste the pose at the playhead (Alt V)" }),
-      textButton("Mirror", actions.mirrorPose!.run, { title: "Exchange left and right (Alt M)" }),
+      textButton("Keyframe this pose", actions.pose!.run, { title: withKey("Ask for the pose at the playhead", "O") }),
+      textButton("Copy", actions.copyPose!.run, { title: withKey("Copy the pose", "Alt C") }),
+      textButton("Paste", actions.pastePose!.run, { title: withKey("Paste the pose at the playhead", "Alt V") }),
+      textButton("Mirror", actions.mirrorPose!.run, { title: withKey("Exchange left and right", "Alt M") }),
     ),
     hasNext &&
       h(

@@ -10,6 +10,8 @@ import { dialog } from "./dialog";
 
 /** Without these nobody can move; the others are found from them. */
 const NEEDED = ["hip", "knee", "ankle", "shoulder", "elbow", "wrist"];
+/** Joints that are needed, left and right. */
+const LEAST = 2 * NEEDED.length;
 /** Pixels of the picture, and within which a joint is hit. */
 const [WIDTH, HEIGHT, REACH] = [340, 430, 14];
 /** Degrees that the picture turns by in a second. */
@@ -59,6 +61,7 @@ export function jointDialog(app: App, files: Files): void {
         `${asked.file.name}: its joints have names or an order that say too little. Choose a part at the right, and its joint there or in the picture; what stays free is found from the others.`,
       ),
       h("div", { class: "naming" }, picture.element, rows),
+      h("p", { class: "unmet", hidden: asked.joints.length >= LEAST }, tooFew(asked.joints.length)),
       message,
       h(
         "div",
@@ -67,6 +70,10 @@ export function jointDialog(app: App, files: Files): void {
       ),
     ];
   });
+}
+
+function tooFew(count: number): string {
+  return `It has ${count} joints, and hips, knees, ankles, shoulders, elbows and wrists are needed: give it more where it comes from.`;
 }
 
 function isNeeded(name: string): boolean {

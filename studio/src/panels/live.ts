@@ -2,6 +2,7 @@
 
 import type { App } from "../app/app";
 import { h, morph } from "../app/dom";
+import { TOUCH, withKey } from "../app/keys";
 import { LIVE_WORDS, type Live } from "../app/live";
 import { textButton } from "./parts";
 
@@ -27,18 +28,18 @@ export function livePanel(app: App, live: Live, root: HTMLElement): void {
         h("b", { class: "grow ellipsis", role: "status" }, done),
         h("small", { class: "quiet" }, `${state.seconds.toFixed(1)} s`),
         textButton("Keep it", () => void live.keep(), {
-          title: "Put everything onto the timeline (R)",
+          title: withKey("Put everything onto the timeline", "R"),
           strong: true,
           disabled: state.seconds < 0.5,
         }),
-        textButton("Leave", () => live.leave(), { title: "Leave live mode (Escape)" }),
+        textButton("Leave", () => live.leave(), { title: withKey("Leave live mode", "Escape") }),
       ),
       h(
         "form",
         { onsubmit: say },
         h("input", {
           type: "text",
-          placeholder: "Say what happens now (Enter)",
+          placeholder: "Say what happens now",
           "aria-label": "What the person does now",
           maxlength: "500",
           value: written,
@@ -49,16 +50,19 @@ export function livePanel(app: App, live: Live, root: HTMLElement): void {
         "div",
         { class: "row wrap" },
         ...LIVE_WORDS.map((words, index) =>
-          textButton(`${index + 1} ${words.replace(/^a person /, "")}`, () => live.say(words), {
+          textButton(`${TOUCH ? "" : `${index + 1} `}${words.replace(/^a person /, "")}`, () => live.say(words), {
             pressed: state.words === words,
           }),
         ),
-        textButton("0 as steered", () => live.say("")),
+        textButton(TOUCH ? "as steered" : "0 as steered", () => live.say("")),
       ),
       h(
         "p",
         { class: state.problem ? "unmet" : "quiet" },
-        state.problem || "W A S D or a gamepad goes, Shift runs, Q E turn the view, a click on the floor sends there.",
+        state.problem ||
+          (TOUCH
+            ? "A press on the floor sends there; a gamepad goes, too."
+            : "W A S D or a gamepad goes, Shift runs, Q E turn the view, a click on the floor sends there."),
       ),
     ]);
   };

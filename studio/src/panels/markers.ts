@@ -2,6 +2,7 @@
 
 import type { App } from "../app/app";
 import { h } from "../app/dom";
+import { withKey } from "../app/keys";
 import { changeMarker } from "../project/markers";
 import { type Marker, length } from "../project/model";
 import { numberField, section, textButton } from "./parts";
@@ -32,6 +33,6 @@ export function markerSection(app: App, marker: Marker, remove: () => void): HTM
         { min: 0, max: length(app.project.value) },
       ),
     ),
-    h("div", { class: "row" }, textButton("Delete", remove, { title: "Delete the marker (Del)" })),
+    h("div", { class: "row" }, textButton("Delete", remove, { title: withKey("Delete the marker", "Del") })),
   );
 }

@@ -8,9 +8,15 @@ import { shownKey } from "./parts";
 export function menu(
   actions: Actions,
   keys: readonly string[],
-  options: { title: string; strong?: boolean; name?: (key: string, action: Action) => string },
+  options: {
+    title: string;
+    strong?: boolean;
+    name?: (key: string, action: Action) => string;
+    /** What the entries from this one on are for; empty: as before. */
+    goal?: (key: string) => string;
+  },
 ): HTMLElement {
-  const { title, strong = false, name = (_, action) => action.label } = options;
+  const { title, strong = false, name = (_, action) => action.label, goal = () => "" } = options;
   const rows = keys.map((key) => ({ key, action: actions[key]! })).filter(({ action }) => action.isThere?.() ?? true);
   return h(
     "details",
@@ -19,7 +25,8 @@ export function menu(
     h(
       "div",
       { class: "sheet" },
-      ...rows.map(({ key, action }) =>
+      ...rows.flatMap(({ key, action }) => [
+        goal(key) && h("p", { class: "goal" }, goal(key)),
         h(
           "button",
           {
@@ -33,7 +40,7 @@ export function menu(
           ...action.keys.slice(0, 1).map((one) => h("kbd", {}, shownKey(one))),
           action.note && h("small", {}, action.note),
         ),
-      ),
+      ]),
     ),
   );
 }

@@ -133,6 +133,9 @@ export function takeNames(app: App, root: HTMLElement): void {
   render();
 }
 
+/** The actions whose keys matter most. */
+const EIGHT = ["play", "write", "add", "path", "target", "four", "undo", "palette"] as const;
+
 export function help(app: App, actions: Actions): void {
   const all = Object.values(actions).filter((one) => one.keys.length);
   const groups = [...new Set(all.map((action) => action.group))];
@@ -143,7 +146,33 @@ export function help(app: App, actions: Actions): void {
         h("dt", {}, ...one.keys.slice(0, 2).map((key) => h("kbd", {}, shownKey(key)))),
         h("dd", {}, one.label),
       ]);
+  const search = h("input", {
+    class: "search",
+    type: "search",
+    placeholder: "Find a key",
+    "aria-label": "Find a key",
+  }) as HTMLInputElement;
+  const eight = h(
+    "p",
+    { class: "eight" },
+    ...EIGHT.map((name) => h("span", {}, h("kbd", {}, shownKey(actions[name]!.keys[0]!)), ` ${actions[name]!.label}`)),
+  );
+  search.oninput = () => {
+    const asked = search.value.trim().toLowerCase();
+    eight.hidden = asked !== "";
+    for (const part of document.querySelectorAll<HTMLElement>("#help .groups section")) {
+      const found = [...part.querySelectorAll<HTMLElement>("dd")].map((name) => {
+        const key = name.previousElementSibling as HTMLElement;
+        const isAsked = `${name.textContent} ${key.textContent}`.toLowerCase().includes(asked);
+        [name.hidden, key.hidden] = [!isAsked, !isAsked];
+        return isAsked;
+      });
+      part.hidden = asked !== "" && !found.some(Boolean);
+    }
+  };
   dialog(app, "help", "Keys", () => [
+    search,
+    eight,
     h(
       "div",
       { class: "groups" },

@@ -6,11 +6,14 @@ import { h, morph } from "../app/dom";
 import { dialog } from "./dialog";
 import { shownKey } from "./parts";
 
+/** Where this browser keeps what was done last from the palette. */
+const RECENT = "motionloom-recent";
+
 /** Actions that a few letters name, the best first; without letters all of them. */
 export function matchingActions(actions: readonly Action[], letters: string): Action[] {
   const parts = letters.toLowerCase().split(/\s+/).filter(Boolean);
-  const score = ({ label, group, note = "" }: Action): number => {
-    const words = `${label} ${group} ${note}`.toLowerCase();
+  const score = ({ label, group, note = "", also = "" }: Action): number => {
+    const words = `${label} ${group} ${note} ${also}`.toLowerCase();
     if (!parts.every((part) => words.includes(part))) return 0;
     return parts.every((part) => new RegExp(`\\b${escaped(part)}`).test(label.toLowerCase())) ? 2 : 1;
   };
@@ -40,6 +43,10 @@ export function palette(app: App, actions: Actions): void {
   const run = (action: Action | undefined) => {
     if (!action) return;
     app.session.update({ dialog: null });
+    localStorage.setItem(
+      RECENT,
+      JSON.stringify([action.label, ...recent().filter((one) => one !== action.label)].slice(0, 5)),
+    );
     action.run();
   };
   const render = () => {
@@ -61,7 +68,9 @@ export function palette(app: App, actions: Actions): void {
   };
   const look = () => {
     const there = Object.values(actions).filter((one) => one !== actions.palette && (one.isThere?.() ?? true));
-    shown = matchingActions(there, input.value);
+    const last = recent();
+    const rank = ({ label }: Action) => (last.includes(label) ? last.indexOf(label) : last.length);
+    shown = input.value.trim() ? matchingActions(there, input.value) : there.sort((a, b) => rank(a) - rank(b));
     at = 0;
     render();
   };
@@ -79,6 +88,16 @@ export function palette(app: App, actions: Actions): void {
     look();
     return [input, list];
   });
+}
+
+/** What was done last from here, the last one first. */
+function recent(): readonly string[] {
+  try {
+    const found: unknown = JSON.parse(localStorage.getItem(RECENT) ?? "[]");
+    return Array.isArray(found) ? found.map(String) : [];
+  } catch {
+    return [];
+  }
 }
 
 function row(action: Action, index: number, chosen: boolean, run: () => void): HTMLElement {

@@ -3,6 +3,7 @@
 import type { Action } from "../app/actions";
 import type { App } from "../app/app";
 import { h } from "../app/dom";
+import { withKey } from "../app/keys";
 import type { Place } from "../project/places";
 import { type Icon, icon } from "./icons";
 
@@ -19,7 +20,7 @@ export function iconButton(
       class: word ? "icon named" : "icon",
       "data-fold": fold ?? false,
       "data-key": key,
-      title: action.keys[0] ? `${title} (${shownKey(action.keys[0])})` : title,
+      title: withKey(title, action.keys[0] && shownKey(action.keys[0])),
       "aria-label": title,
       onclick: action.run,
       "aria-pressed": pressed === undefined ? null : String(pressed),

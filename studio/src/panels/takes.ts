@@ -4,6 +4,7 @@ import type { Actions } from "../app/actions";
 import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h } from "../app/dom";
+import { TOUCH, withKey } from "../app/keys";
 import type { Fan } from "../app/session";
 import { type Clip, type Project, CHANGED, NO_CONSTRAINTS, keptTake } from "../project/model";
 import { GHOSTS } from "../stage/theme";
@@ -15,7 +16,7 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
     app.project.change(`keep take ${index + 1}`, (old) => (old.kept === index ? old : { ...old, kept: index }));
   const deed = (key: string, text: string, disabled = false) =>
     textButton(text, actions[key]!.run, {
-      title: `${actions[key]!.label} (${shownKey(actions[key]!.keys[0]!)})`,
+      title: withKey(actions[key]!.label, shownKey(actions[key]!.keys[0]!)),
       disabled,
     });
   const none = !project.takes.length;
@@ -42,7 +43,10 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
         ),
       ),
     ),
-    ...(project.takes[project.kept]?.told ?? []).map((one) => h("p", { class: "quiet told" }, one)),
+    obedience(project, actions),
+    ...(keptTake(project)?.told ?? [])
+      .filter((one) => !MISSED.test(one))
+      .map((one) => h("p", { class: "quiet told" }, one)),
     deepest(project) > 0 &&
       h(
         "p",
@@ -50,7 +54,11 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
         `The two are in each other by up to ${Math.round(deepest(project) * 100)} cm: red on the ruler.`,
       ),
     clips.length > 1 &&
-      h("div", { class: "row" }, textButton("Side by side", actions.beside!.run, { pressed: sideBySide, title: "B" })),
+      h(
+        "div",
+        { class: "row" },
+        textButton("Side by side", actions.beside!.run, { pressed: sideBySide, title: withKey("All takes", "B") }),
+      ),
     h(
       "div",
       { class: "row wrap" },
@@ -61,6 +69,39 @@ export function takesSection(app: App, project: Project, actions: Actions): HTML
       deed("loop", "Loop", none),
       deed("aside", "Put aside", none),
     ),
+  );
+}
+
+/** Seconds of the longest motion in which the words are looked for. */
+const LOOKED = 120;
+
+/** What of the words was looked for and is not in the motion, as the server says it. */
+const MISSED = /^not seen: (.+)$/;
+
+/** Whether what the words say plainly is seen in the kept take; of others, such as clips, nothing is said. */
+function obedience(project: Project, actions: Actions): HTMLElement | false {
+  const take = keptTake(project);
+  const told = take?.told ?? [];
+  const lines = [...told, ...(take?.notes ?? []).map((one) => one.line)];
+  const found = lines.map((one) => MISSED.exec(one)?.[1]).filter((one) => one !== undefined);
+  const missed = found.length ? [...new Set(found)].join(", ") : undefined;
+  if (missed !== undefined) {
+    const more =
+      project.count === 4 ? textButton("Draw again?", actions.draw!.run) : textButton("Four takes?", actions.four!.run);
+    return h(
+      "div",
+      { class: "row wrap seen" },
+      h("b", { class: "badge not" }, "Not seen"),
+      h("span", { class: "grow" }, missed),
+      more,
+    );
+  }
+  const isWhole =
+    take?.how === "drawn" && !take.notes?.length && told.length === 1 && take.people === 1 && take.seconds <= LOOKED;
+  const title = "Nothing that the words say plainly is missing";
+  return (
+    isWhole &&
+    h("div", { class: "row seen" }, h("b", { class: "badge", title }, "Seen"), h("span", {}, "what the words ask for"))
   );
 }
 
@@ -75,7 +116,7 @@ export function fanSection(app: App, deeds: Deeds, fan: Fan): HTMLElement {
     h(
       "p",
       { class: "quiet" },
-      "Each ghost is a future of this motion. Choose one with its number, or leave with Escape.",
+      `Each ghost is a future of this motion. Choose one${TOUCH ? "." : " with its number, or leave with Escape."}`,
     ),
     h(
       "div",

@@ -2,6 +2,7 @@
 
 import { type App, shownClip } from "../app/app";
 import { h } from "../app/dom";
+import { withKey } from "../app/keys";
 import { chosenBlocks } from "../app/session";
 import { facingAt, jointAt } from "../body/clip";
 import { HEAD } from "../body/skeleton";
@@ -17,7 +18,7 @@ import {
   newId,
   round,
 } from "../project/model";
-import { ORDER, PARTS, SMOOTH, SMOOTHEST, type Part, addTrack, changeTrack } from "../project/tracks";
+import { ORDER, PARTS, SMOOTH, SMOOTHEST, type Part, addTrack, changeTrack, fights } from "../project/tracks";
 import { numberField, section, textButton, wordsArea } from "./parts";
 
 /** Seconds where neither a stretch is marked nor a block selected. */
@@ -145,6 +146,7 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
         { min: 0.05, max: SMOOTHEST },
       ),
     ...notes.map(({ line }) => h("p", { class: "remark", role: "note" }, line)),
+    ...fights(value.people[who]!, { track: track.id }).map((line) => h("p", { class: "remark", role: "note" }, line)),
     h(
       "div",
       { class: "pair" },
@@ -158,7 +160,7 @@ export function trackSection(app: App, track: Track, remove: () => void): HTMLEl
         ),
       ),
     ),
-    h("div", { class: "row" }, textButton("Delete", remove, { title: "Delete these words (Del)" })),
+    h("div", { class: "row" }, textButton("Delete", remove, { title: withKey("Delete these words", "Del") })),
   );
 }
 

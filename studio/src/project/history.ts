@@ -41,6 +41,8 @@ export class History<T> {
   constructor(
     private present: T,
     kept: StoredHistory<T> = { past: [], future: [] },
+    /** What follows by itself from a change: the next value, of the old one and of the edited one. */
+    private readonly settle: (old: T, next: T) => T = (_, next) => next,
   ) {
     this.past = [...kept.past];
     this.future = [...kept.future];
@@ -86,7 +88,8 @@ export class History<T> {
   /** Make a new value that undo takes back. An edit that gives the same value back changes nothing. */
   change(label: string, edit: (value: T) => T, options: ChangeOptions = {}): void {
     const { merge = "", draft = false, typed = false } = options;
-    const next = edit(this.present);
+    const edited = edit(this.present);
+    const next = edited === this.present ? edited : this.settle(this.present, edited);
     if (next !== this.present) {
       if (!merge || merge !== this.merge) this.past.push({ label, value: this.present });
       this.merge = merge;

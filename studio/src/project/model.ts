@@ -201,7 +201,7 @@ export function segment(text: string, seconds: number): Segment {
 export function exampleProject(): Project {
   return {
     version: VERSION,
-    name: "Untitled",
+    name: UNTITLED,
     seed: 1,
     count: 1,
     segments: [segment("a person walks forward", 3.5), segment("a person waves with the right hand", 3)],
@@ -218,6 +218,32 @@ export function exampleProject(): Project {
     character: null,
     given: null,
   };
+}
+
+/** Letters of a project's words that name it, and the name of one without words. */
+const NAMED = 40;
+const UNTITLED = "Untitled";
+
+/** Whether anything is said in it. */
+export function hasWords(project: Project): boolean {
+  return project.segments.some((one) => one.text.trim());
+}
+
+/** The name that a project has by its words: those of its blocks, the person of the first one not repeated. */
+export function wordsName({ segments }: Pick<Project, "segments">): string {
+  const texts = segments.map((one) => one.text.trim()).filter(Boolean);
+  const person = /^(an?|the) \S+ /i.exec(texts[0] ?? "")?.[0] ?? "";
+  const rest = texts.map((text, index) =>
+    index && person && text.startsWith(person) ? text.slice(person.length) : text,
+  );
+  return Array.from(rest.join(", ")).slice(0, NAMED).join("") || UNTITLED;
+}
+
+/** The next state of a project, named after its words as they are now unless somebody has named it. */
+export function renamed(old: Project, next: Project): Project {
+  if (next.segments === old.segments || next.name !== old.name) return next;
+  const name = wordsName(next);
+  return [UNTITLED, wordsName(old)].includes(old.name) && name !== old.name ? { ...next, name } : next;
 }
 
 /** A project in which nothing is said yet. */

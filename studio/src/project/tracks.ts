@@ -1,6 +1,18 @@
 /** Parts of the body that do something else, for some seconds, than the words of the blocks say. */
 
-import { type Project, type Range, type Track, OTHER, clamp, length, newId, round, toFrame } from "./model";
+import { HEAD, LEFT, NECK, RIGHT, jointName } from "../body/skeleton";
+import {
+  type Person,
+  type Project,
+  type Range,
+  type Track,
+  OTHER,
+  clamp,
+  length,
+  newId,
+  round,
+  toFrame,
+} from "./model";
 import { changePerson } from "./timeline";
 import type { EditRequest } from "../server/types";
 
@@ -143,6 +155,30 @@ export function trackCommands(project: Project, name: string): string[] {
     const [old, next] = [index ? `${name}_${index}` : name, `${name}_${index + 1}`];
     return `edit ${old}.npz${said}${kept}${spans} --seed ${seed} --out ${next}.npz`;
   });
+}
+
+/** The joints whose targets a part moves away from. */
+const MOVED: Readonly<Record<Part, readonly number[]>> = {
+  body: [],
+  arms: [LEFT.shoulder, LEFT.elbow, LEFT.wrist, RIGHT.shoulder, RIGHT.elbow, RIGHT.wrist],
+  right_arm: [RIGHT.shoulder, RIGHT.elbow, RIGHT.wrist],
+  left_arm: [LEFT.shoulder, LEFT.elbow, LEFT.wrist],
+  legs: [LEFT.hip, LEFT.knee, LEFT.ankle, LEFT.foot, RIGHT.hip, RIGHT.knee, RIGHT.ankle, RIGHT.foot],
+  head: [NECK, HEAD],
+};
+
+/** Sentences about targets at whose time a part does something else: who of the two wins. */
+export function fights({ targets, tracks }: Person, only: { track?: string; target?: string } = {}): string[] {
+  return tracks.flatMap((track) =>
+    targets
+      .filter((one) => MOVED[track.part].includes(one.joint) && trackText(track) && !track.smooth)
+      .filter((one) => one.time <= track.until && (one.until ?? one.time) >= track.from)
+      .filter((one) => (only.track ?? track.id) === track.id && (only.target ?? one.id) === one.id)
+      .map(
+        (one) =>
+          `“${trackText(track)}” (${PARTS[track.part].name.toLowerCase()}) is laid over the target of the ${jointName(one.joint)} at ${one.time.toFixed(2)} s, and wins; move one of the two in time to have both.`,
+      ),
+  );
 }
 
 function within(project: Project, from: number, until: number): { from: number; until: number } {

@@ -181,7 +181,14 @@ export function takeOf(result: Result, how: string): Take {
   const { id, seed, seconds, people, happened = [], remarks = [], notes = [] } = result;
   const others = remarks.filter((line) => !notes.some((one) => one.line === line));
   const { overlaps = [] } = result.measures ?? {};
-  return { motion: id, seed, seconds, people, how, told: [...sentences(happened), ...others], notes, overlaps };
+  const told = [...sentences(happened), ...others.map(unseen)];
+  const seen = notes.map((one) => ({ ...one, line: unseen(one.line) }));
+  return { motion: id, seed, seconds, people, how, told, notes: seen, overlaps };
+}
+
+/** What was looked for in vain, without how often and in which sentence. */
+export function unseen(line: string): string {
+  return line.replace(/^('.*': )?not found in \d+ attempts?: /, "not seen: ");
 }
 
 function sentences(happened: Events): string[] {

@@ -4,11 +4,15 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { type Backdrop, NONE, cover, textureOf } from "./backdrop";
 import { Floor } from "./floor";
+import type { Vec3 } from "../project/model";
 import { Pending } from "./pending";
 import type { StageTheme } from "./theme";
 
 /** The layer of what is there to be dragged, which no film shows. */
 export const HANDLES = 1;
+
+/** The part of the picture's height that people with raised hands take. */
+const PEOPLE = 0.8;
 
 /** Frames slower than this for a while make the picture coarser. */
 const SLOW = 45;
@@ -41,7 +45,7 @@ export class Scene {
   private isCoarse = false;
   private readonly pending: Pending;
   private next = 0;
-  private lifted = 0;
+  private covered = 0;
   private theme: StageTheme;
   private backdrop = NONE;
   private picture: THREE.Texture | null = null;
@@ -106,9 +110,9 @@ export class Scene {
     this.renderer.forceContextLoss();
   }
 
-  /** Show the middle of the picture so many pixels higher, where something lies over what is below. */
-  lift(pixels: number): void {
-    this.lifted = pixels;
+  /** Show the people above something that lies over so many pixels at the bottom, smaller if they need it. */
+  showAbove(pixels: number): void {
+    this.covered = pixels;
     this.resize();
   }
 
@@ -150,6 +154,7 @@ export class Scene {
   centre(x: number, z: number, follow: boolean, ease: number): void {
     this.sun.position.set(x + 2.4, 5.2, z + 2.2);
     this.sun.target.position.set(x, 0, z);
+    this.floor.centre(x, z);
     if (!follow) return;
     const step = new THREE.Vector3(x - this.orbit.target.x, 0, z - this.orbit.target.z).multiplyScalar(ease);
     if (step.lengthSq() < 1e-10) return;
@@ -231,7 +236,13 @@ export class Scene {
     );
   }
 
+  /** Where feet are, under which the floor is darker. */
+  stand(feet: readonly Vec3[]): void {
+    this.floor.stand(feet);
+  }
+
   private draw(): void {
+    this.floor.face(this.yaw());
     if (this.paint) this.paint();
     else this.renderer.render(this.scene, this.camera);
   }
@@ -291,8 +302,12 @@ export class Scene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     if (this.picture) cover(this.picture, width / height);
-    const [right, up] = this.filmed ? [0, 0] : [(this.besides * width) / 2, this.lifted];
-    if (right || up) this.camera.setViewOffset(width, height, right, up, width, height);
+    const free = this.filmed ? height : height - Math.min(this.covered, height * 0.7);
+    const size = Math.min(1, free / (PEOPLE * height));
+    const [wide, high] = [width * size, height * size];
+    const right = this.filmed ? 0 : (wide - width + this.besides * width) / 2;
+    const up = (high - free) / 2;
+    if (right || up || size < 1) this.camera.setViewOffset(wide, high, right, up, width, height);
     else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.invalidate();
@@ -308,7 +323,7 @@ function sunlight(): THREE.DirectionalLight {
   const sun = new THREE.DirectionalLight("#fff6e8", 2);
   sun.castShadow = true;
   sun.shadow.mapSize.set(2048, 2048);
-  sun.shadow.radius = 5;
+  sun.shadow.radius = 9;
   sun.shadow.bias = -0.0005;
   sun.shadow.normalBias = 0.02;
   const view = sun.shadow.camera;

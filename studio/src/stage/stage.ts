@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import { type App, denoised, duration, seenTakes, shownClip } from "../app/app";
 import { jointAt } from "../body/clip";
+import { HEAD, LEFT, RIGHT } from "../body/skeleton";
 import type { Ground } from "../project/path";
 import { GazeTool } from "./gazeTool";
 import { Cast, type Ghost } from "./cast";
@@ -18,6 +19,7 @@ import { DARK, GHOSTS, LIGHT, type StageTheme } from "./theme";
 import { Trails } from "./trails";
 import { SplitView } from "./views";
 
+const FEET = [LEFT.ankle, RIGHT.ankle];
 /** Pixels that the pointer may move in a click. */
 const CLICKED = 5;
 /** Seconds from the playhead at which the ghosts before and behind it are. */
@@ -67,6 +69,7 @@ export class Stage {
       this.targets.reportPositions();
       this.meetings.reportPositions();
       said.update();
+      this.reportPerson();
     };
     this.listen(canvas);
     app.project.subscribe(() => this.update());
@@ -177,9 +180,20 @@ export class Stage {
     this.targets.update();
     this.meetings.update();
     this.views.show(views);
+    const feet = (_: unknown, person: number) => FEET.map((joint) => jointAt(clip!, person, joint, time));
+    this.scene.stand(sideBySide ? [] : (clip?.people.flatMap(feet) ?? []));
     const people = clip?.people.map((_, person) => jointAt(clip, person, 0, time)) ?? [[0, 1, 0] as const];
     this.scene.paint = sideBySide ? () => this.paintTakes() : views && (() => this.views.paint(views, people));
     this.scene.invalidate();
+  }
+
+  /** Say in the page where the first person's head and lower foot are on the screen. */
+  private reportPerson(): void {
+    const clip = shownClip(this.app);
+    const place = (joint: number) => new THREE.Vector3(...jointAt(clip!, 0, joint, this.app.session.value.time));
+    const onScreen = (joint: number) => this.scene.onScreen(place(joint));
+    this.scene.report("head", clip && onScreen(HEAD));
+    this.scene.report("foot", clip && FEET.map(onScreen).reduce((a, b) => (a[1] > b[1] ? a : b)));
   }
 
   private ghosts(): Ghost[] {

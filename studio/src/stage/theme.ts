@@ -32,8 +32,8 @@ export const LIGHT: StageTheme = {
   shadow: 0.26,
   sky: "#ffffff",
   ground: "#c9c2b4",
-  sun: 2.1,
-  fill: 1.25,
+  sun: 1.6,
+  fill: 1.6,
   people: [
     { body: "#ead9bd", joints: "#d2b995", opacity: 1 },
     { body: "#b4c6d4", joints: "#94acbf", opacity: 1 },
@@ -52,8 +52,8 @@ export const DARK: StageTheme = {
   shadow: 0.5,
   sky: "#cfd8e6",
   ground: "#35322e",
-  sun: 2.0,
-  fill: 0.8,
+  sun: 1.5,
+  fill: 1.1,
   people: [
     { body: "#dcc8a6", joints: "#bfa27a", opacity: 1 },
     { body: "#94abbd", joints: "#7690a5", opacity: 1 },

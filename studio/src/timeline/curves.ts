@@ -2,6 +2,7 @@
 
 import { type App, shownClip } from "../app/app";
 import { h, svg } from "../app/dom";
+import { withKey } from "../app/keys";
 import { type MotionClip, jointAt } from "../body/clip";
 import { TARGETS, jointName } from "../body/skeleton";
 
@@ -70,7 +71,11 @@ export class Curves {
         ) as unknown as HTMLElement,
         h(
           "button",
-          { class: "text", title: "Another joint; or choose one on the stage (T)", onclick: () => this.next() },
+          {
+            class: "text",
+            title: withKey("Another joint; or choose one on the stage", "T"),
+            onclick: () => this.next(),
+          },
           this.description(),
         ),
       ),

@@ -5,6 +5,14 @@ import { h } from "../app/dom";
 import { writeTrack } from "../panels/tracks";
 import { type Project, keptTake } from "../project/model";
 import { ORDER, PARTS, type Part, trackKey, trackText } from "../project/tracks";
+import { hint } from "./hint";
+
+/** What parts of the body may do, while none does anything. */
+const BEGINNINGS = [
+  ["track", "Let an arm do something else", "Shift A"],
+  ["look", "Look somewhere", "Shift L"],
+  ["smooth", "Smooth", "Shift N"],
+] as const;
 
 /** The parts that have words of their own; null in place of them: none has. */
 export function partsShown(project: Project, who: number): (Part | null)[] {
@@ -46,11 +54,6 @@ export function trackRows(app: App, who: number, span: (from: number, until: num
         edge("until", "to"),
       );
     });
-    const hint = h(
-      "span",
-      { class: "hint" },
-      "Shift A: an arm, the legs or the head do something else; Shift L: the head looks somewhere; Shift N: smoother",
-    );
     return h(
       "div",
       {
@@ -60,7 +63,7 @@ export function trackRows(app: App, who: number, span: (from: number, until: num
         role: "group",
         "aria-label": part ? PARTS[part].name : "Parts of the body",
       },
-      ...(part ? stretches : [hint]),
+      ...(part ? stretches : BEGINNINGS.map(([act, text, key]) => hint(act, text, key))),
     );
   });
 }

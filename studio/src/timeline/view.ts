@@ -2,6 +2,8 @@
 
 import { type App, duration, shownClip } from "../app/app";
 import { h, morph } from "../app/dom";
+import { TOUCH, withKey } from "../app/keys";
+import { hint } from "./hint";
 import { chosenBlocks } from "../app/session";
 import { jointName } from "../body/skeleton";
 import { UNMET, isMeasurable, isUnmet, pathMiss, poseMiss, targetMiss } from "../project/misses";
@@ -36,7 +38,7 @@ const LABELS = {
 } as const;
 
 /** What a press of the pointer does to a block's words, as far as that is true of this pointer. */
-const WRITE = matchMedia("(pointer: coarse)").matches ? "tap twice to write" : "double-click to write";
+const WRITE = TOUCH ? "tap twice to write" : "double-click to write";
 
 export class TimelineView {
   /** Pixels of one second. */
@@ -267,7 +269,7 @@ export class TimelineView {
         "data-act": "add",
         "data-key": "add",
         style: this.left(at.at(-1)!),
-        title: "Add a block (A)",
+        title: withKey("Add a block", "A"),
         "aria-label": "Add a block",
       },
       "+",
@@ -442,7 +444,7 @@ export class TimelineView {
             }),
           ),
         ]
-      : [h("span", { class: "hint" }, "P, then draw on the floor")];
+      : [hint("path", "Draw a path", "P")];
     const said = this.tooltip((at) => (at.kind === "path" && at.who === who ? 0 : null));
     return h(
       "div",
@@ -479,7 +481,7 @@ export class TimelineView {
     return h(
       "div",
       { class: "track joints", "data-drag": "band", "data-key": "joints", "aria-label": "Targets of joints" },
-      ...(keys.length ? keys : [h("span", { class: "hint" }, "T, then drag a joint")]),
+      ...(keys.length ? keys : [hint("target", "Drag a joint", "T")]),
       this.tooltip((at) =>
         at.kind === "target" && at.who === who ? (person.targets.find((one) => one.id === at.id)?.time ?? null) : null,
       ),
@@ -506,7 +508,7 @@ export class TimelineView {
     return h(
       "div",
       { class: "track poses", "data-drag": "band", "data-key": "poses", "data-drop": "pose", "aria-label": "Poses" },
-      ...(keys.length ? keys : [h("span", { class: "hint" }, "O keeps the pose at hand")]),
+      ...(keys.length ? keys : [hint("pose", "Keep this pose", "O")]),
       this.tooltip((at) =>
         at.kind === "pose" && at.who === who ? (person.poses.find((one) => one.id === at.id)?.time ?? null) : null,
       ),

@@ -72,6 +72,7 @@ class Studio:
         self.page.wait_for_selector("body[data-ready]")
         if self.page.locator("#transport button[aria-label=Pause]").count():
             self.key("Space")
+        self.key("Escape")  # the field for words had the keys
         self.drawn()
 
     def put(self, project: dict[str, Any]) -> None:

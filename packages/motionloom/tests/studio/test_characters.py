@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+import pytest
 
 from motionloom import load
 from motionloom.io.character import load_character
@@ -256,3 +257,23 @@ def test_other_peoples_characters_are_on_the_stage(studio: Studio):
         assert json.loads(data[20 : 20 + length])["skins"]
         studio.key("Control+z")
     assert not studio.faults
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("m2m_fox.glb", "there is a body in it, but no skeleton"),
+        ("rpm_walk.glb", "There is no body in rpm_walk.glb"),
+    ],
+)
+def test_what_a_file_lacks_is_told(studio: Studio, name: str, sentence: str):
+    studio.drop(shared(f"rigs/{name}"))
+    studio.says(studio.page.locator(".notice[role=alert]"), sentence)
+    assert studio.page.locator("#joints[open]").count() == 0
+
+
+def test_a_body_in_pieces_with_too_few_joints_is_asked_about(studio: Studio):
+    studio.drop(shared("rigs/kenney.glb"))
+    studio.page.wait_for_selector("#joints[open]")
+    studio.says(studio.page.locator("#joints .unmet"), "It has 7 joints")
+    studio.key("Escape")

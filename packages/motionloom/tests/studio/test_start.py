@@ -45,6 +45,18 @@ def test_a_new_folder_asks_what_the_person_should_do_while_somebody_moves(empty:
     empty.until("document.querySelector('.clock').textContent > '0.5'")
 
 
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (1280, 720), (390, 844)])
+def test_nobody_is_hidden_behind_the_first_question(empty: Studio, width: int, height: int):
+    """Head and feet are on the stage, above the card, however large the window is."""
+    page = empty.page
+    page.set_viewport_size({"width": width, "height": height})
+    (_, head), (_, foot) = empty.at("head"), empty.at("foot")
+    top = page.locator("#stage").bounding_box()["y"]
+    card = page.locator("#start").bounding_box()["y"]
+    page.set_viewport_size({"width": 1280, "height": 800})
+    assert top + 15 < head < foot < card
+
+
 @pytest.mark.parametrize("sentence", DEEDS)
 def test_each_sentence_that_is_offered_is_obeyed(empty: Studio, sentence: str):
     """Measured on the joints, as drawn by a click on it in a new project."""
@@ -53,7 +65,8 @@ def test_each_sentence_that_is_offered_is_obeyed(empty: Studio, sentence: str):
     empty.page.locator("#start .chip", has_text=sentence).click()
     empty.page.wait_for_selector("#start", state="hidden")
     project = empty.project()
-    assert project["name"] == sentence[:40]
+    texts = [one["text"] for one in project["segments"]]
+    assert project["name"].startswith(texts[0][:40]), "it is named after its words"
     told = project["takes"][0]["told"][0]
     assert all(deed in told for deed in DEEDS[sentence]), told
     if "waves" in sentence:
@@ -73,7 +86,7 @@ def test_what_is_typed_becomes_a_block_for_each_action(empty: Studio):
     say(empty, "a person jumps, then sits down")
     project = empty.project()
     assert [one["text"] for one in project["segments"]] == ["a person jumps", "a person sits down"]
-    assert project["name"] == "a person jumps, then sits down"
+    assert project["name"] == "a person jumps, sits down"
     assert len(project["takes"]) == 1
 
 
@@ -84,7 +97,7 @@ def test_other_projects_are_opened_with_their_own_undo_and_none_is_lost(empty: S
     say(empty, "a person kneels down")
     empty.drawn()
     empty.key("Alt+o")
-    card = page.locator("#projects .card", has_text="a person jumps, then sits down").first
+    card = page.locator("#projects .card", has_text="a person jumps, sits down").first
     card.click()
     page.wait_for_selector("#projects", state="hidden")
     empty.says(page.locator(".block"), "a person jumps")
@@ -175,4 +188,57 @@ def test_the_palette_finds_and_does_everything(studio: Studio):
     assert missing <= idle, "which have nothing to do now"
     keys = page.locator("#help dt kbd").all_inner_texts()
     assert sorted(keys) == sorted(set(keys)), "a key has one meaning"
+    studio.key("Escape")
+
+
+def test_words_typed_on_a_project_that_is_opened_again_do_nothing_else(studio: Studio):
+    """Letters that are also keys of the page are written into the one field; `Enter` puts them behind what is there."""
+    page = studio.page
+    before = studio.blocks()
+    page.goto(studio.server.page)
+    page.wait_for_selector("body[data-ready]")
+    page.keyboard.type("a man jumps", delay=5)
+    field = page.locator("#prompt input")
+    assert field.input_value() == "a man jumps"
+    assert studio.blocks() == before
+    studio.key("Enter")
+    page.locator(".track.words .block").nth(len(before)).wait_for()
+    assert [text for text, _ in studio.blocks()] == [text for text, _ in before] + ["a man jumps"]
+    assert field.input_value() == ""
+    studio.key("d")
+    assert len(studio.blocks()) == len(before) + 2, "keys act again"
+
+
+def test_the_field_begins_a_project_anew_and_the_old_one_stays(studio: Studio):
+    page, old = studio.page, studio.project()
+    page.locator("#prompt input").fill("a person claps")
+    page.get_by_role("button", name="New", exact=True).click()
+    studio.says(page.locator(".block"), "a person claps")
+    project = studio.project()
+    assert [one["text"] for one in project["segments"]] == ["a person claps"]
+    assert project["id"] != old["id"]
+    assert old["name"] in names(studio)
+
+
+def test_keys_are_found_by_their_words(studio: Studio):
+    page = studio.page
+    studio.key("?")
+    page.wait_for_selector("#help[open]")
+    assert page.locator("#help .eight kbd").count() == 8
+    page.locator("#help .search").fill("mirror")
+    assert page.locator("#help dd:visible").all_inner_texts() == ["Mirror the pose"]
+    studio.key("Escape")
+
+
+def test_the_palette_knows_other_programs_and_begins_with_what_was_done_last(studio: Studio):
+    page = studio.page
+    first = page.locator("#palette [role=option]").first
+    studio.key("Control+k")
+    page.keyboard.type("unity")
+    studio.says(first, "Export GLB")
+    page.locator("#palette .search").fill("dupl")
+    studio.key("Enter")
+    page.wait_for_selector("#palette", state="hidden")
+    studio.key("Control+k")
+    studio.says(first, "Duplicate the block")
     studio.key("Escape")
