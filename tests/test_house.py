@@ -19,7 +19,7 @@ FILES = sorted([*PACKAGES.glob("*/src/**/*.py"), *(ROOT / "blender").glob("*.py"
 TESTS = sorted(path for folder in (ROOT / "tests", PACKAGES) for path in folder.rglob("test_*.py"))
 WEIGHTS = sorted((SOURCE / "weights").glob("*.safetensors"))
 MAX_FUNCTION_LINES = 75
-MAX_FILE_LINES = 480
+MAX_FILE_LINES = 496
 BUDGETS = {
     "lab/suites": 8_753,
     "tasks": 6_927,
