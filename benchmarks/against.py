@@ -31,8 +31,8 @@ from motionloom.live.live import Live
 from motionloom.tasks.long import compose
 from motionloom.tasks.predict import predict
 from motionloom.tasks.text import generate
-from motionloom.weights.predictor import find_predictor, load_predictor
-from motionloom.weights.prior import Prior
+from motionloom.core.models.predictor import find_predictor, load_predictor
+from motionloom.core.models.prior import Prior
 HOW = ("slowly", "fast", "happily", "and turns")
 TEXTS = [f"a person {doing} {how}" for doing in ("walks", "runs", "dances") for how in HOW]
 prior, walk = Prior.load(), load(sys.argv[2])

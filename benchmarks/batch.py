@@ -130,9 +130,9 @@ def _family(pids: list[int]) -> list[int]:
 
 def pure(rows: int, steps: int, weights: str) -> None:
     """Draw and solve rows of 4 s in this process when a line comes in; say the seconds of it."""
-    from motionloom.runtime import set_threads
+    from motionloom.core.models.networks import set_threads
+    from motionloom.core.models.prior import Prior
     from motionloom.tasks.text import finish, frames_in, sample_features
-    from motionloom.weights.prior import Prior
 
     set_threads(1)
     prior = Prior.load(weights)
@@ -174,7 +174,7 @@ def profile(rows: int, steps: int, weights: str) -> None:
     from motionloom.bulk.row import parse
     from motionloom.bulk.shard import entry_of
     from motionloom.bulk.writers import writer
-    from motionloom.runtime import set_threads
+    from motionloom.core.models.networks import set_threads
     from motionloom.tasks import text
 
     set_threads(1)

@@ -8,8 +8,8 @@ Medians of five, each beside the usual one in the same turn, on an idle machine.
 import statistics
 import time
 
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 
 TIMES = 5

@@ -9,14 +9,14 @@ choice by the mean alone, which it was before.
 
 import numpy as np
 
-from motionloom.diffusion.sampling import row_seed
+from motionloom.core.diffusion.sampling import row_seed
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.goals.sequence import split_actions
 from motionloom.kinematics.physics import jerk, velocity
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks import best
 from motionloom.tasks.sampling import Rows, sample, with_best_seeds
 from motionloom.tasks.text import finish, frames_in, sample_features
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.obedience import EVERYDAY, Check
 from motionloom_lab.suites.harness import weight_marks
 

@@ -17,13 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import save
 from motionloom.io.character import Character, load_character
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.skeleton import SMPL22
 from tests.io.in_blender import Job, Shown, apart, python_with_bpy, shown
 from tests.io.rigged import wave
 

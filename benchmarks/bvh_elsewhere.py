@@ -18,15 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks import set_threads
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.io import load
 from motionloom.io.bvh import save_bvh
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.runtime import set_threads
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior
 
 _THREE = """
 import fs from "fs"; import * as T from "three"; import {BVHLoader} from "three/examples/jsm/loaders/BVHLoader.js";

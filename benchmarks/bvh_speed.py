@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import Skeleton
 from motionloom.io.bvh import load_bvh, save_bvh
-from motionloom.motion import Motion
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import Skeleton
 
 JOINTS = 24
 

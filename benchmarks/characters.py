@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.io.gltf_read import open_glb
 from tests.io.round_trip import errors, onto
 

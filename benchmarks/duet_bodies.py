@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from motionloom import Motion, Prior
+from motionloom.core.models.container import PAIRS, PRIORS, weights_digest
+from motionloom.core.models.pair import PairBlock
 from motionloom.kinematics.capsules import overlap, trunk_distance, wrist_distance
 from motionloom.kinematics.physics import foot_skate
 from motionloom.tasks.pair import generate_pair
-from motionloom.weights.container import PAIRS, PRIORS, weights_digest
-from motionloom.weights.pair import PairBlock
 
 PROMPTS = (
     "two people fight",

@@ -12,9 +12,9 @@ import argparse
 
 import numpy as np
 
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.kinematics.wholeness import ENOUGH, LOWEST_SHOULDERS, broken_frames, shoulders_below, wholeness
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 
 FEW = 10

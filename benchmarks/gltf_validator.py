@@ -19,13 +19,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.character import load_character
 from motionloom.io.gltf import save_glb
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.skeleton import SMPL22
 from tests.io.rigged import Hero, wave
 
 SUFFIXES = (".glb", ".gltf", ".vrm")

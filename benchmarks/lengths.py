@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.goals.sequence import split_actions, usual_seconds
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.physics import Array, smooth, velocity
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.obedience import EVERYDAY
 from motionloom_lab.suites.harness import weight_marks
 from motionloom_lab.suites.items import real_clips

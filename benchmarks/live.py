@@ -20,9 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.features.layout import FEET, FPS
+from motionloom.core.body.feet import planted_feet
+from motionloom.core.features.layout import FEET, FPS
+from motionloom.core.models.networks.session import threads
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.goals.segment import Segment
-from motionloom.kinematics.feet import planted_feet
 from motionloom.kinematics.physics import speed
 from motionloom.live.clock import LATE, WAITING
 from motionloom.live.commands import Command, Say, Steer, to_json
@@ -31,10 +34,7 @@ from motionloom.live.live import Live, motion_of
 from motionloom.live.pair import LivePair
 from motionloom.live.sessions import Session, Sessions
 from motionloom.live.socket import live_session
-from motionloom.runtime.session import threads
 from motionloom.tasks.long import compose
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import check
 from motionloom_lab.metrics.skate import slide
 from motionloom_lab.metrics.transitions import mean_jerk

@@ -15,9 +15,9 @@ from collections.abc import Sequence
 import numpy as np
 from lengths import rest
 
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.goals.verbs import MOODS, PLAINER
 from motionloom.tasks.worded import generate_worded
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 
 OBJECTS = {"throw": " a ball", "punch": " the bag"}

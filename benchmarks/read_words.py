@@ -5,10 +5,10 @@ Usage: python benchmarks/read_words.py > benchmarks/read_words.txt
 
 import sys
 
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.goals.amounts import is_met, measured
 from motionloom.tasks.text import generate
 from motionloom.tasks.worded import generate_timelines, read
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 
 SENTENCES = (

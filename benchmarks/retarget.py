@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.core.motion import Motion
 from motionloom.io.asf import load_asf_amc
 from motionloom.io.bvh import load_bvh
-from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22, joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.axes import CHILD

@@ -20,13 +20,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from motionloom import io
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.prior import find_weights
+from motionloom.core.motion import Motion
 from motionloom.robots.body import Robot, read_robot
 from motionloom.robots.clip import Clip, put_on_robot
 from motionloom.robots.figures import Figures, measure
-from motionloom.weights.container import weights_digest
-from motionloom.weights.prior import find_weights
 
 KINDS = (
     "a person walks forward",
@@ -64,8 +64,8 @@ def recordings(folder: Path, count: int, fps: float | None) -> Iterator[tuple[st
 
 def drawn(count: int, weights: str) -> Iterator[tuple[str, Motion]]:
     """Clips of `KINDS` by seed."""
+    from motionloom.core.models.prior import Prior
     from motionloom.tasks.text import generate
-    from motionloom.weights.prior import Prior
 
     prior = Prior.load(weights)
     for number in range(count):

@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from motionloom.diffusion import join_rows
-from motionloom.runtime import set_threads
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.sizes import NetConfig
-from motionloom.weights.prior import Prior
+from motionloom.core.diffusion import join_rows
+from motionloom.core.models.networks import set_threads
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.sizes import NetConfig
+from motionloom.core.models.prior import Prior
 from motionloom_train.modules import prior_module
 from motionloom_train.nets.prior import Bound
 

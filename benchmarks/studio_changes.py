@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from motionloom.core.models.prior import Prior, find_weights
+from motionloom.core.motion import Motion
 from motionloom.goals.timeline import timeline_from
 from motionloom.io import load, save
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Timed
 from motionloom.tasks.splice import concatenate
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 from tests.studio import started
 from tests.studio.studio import NOTHING, PROJECT, Studio

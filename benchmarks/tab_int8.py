@@ -14,7 +14,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from motionloom.weights.prior import find_weights, load_prior, save_prior
+from motionloom.core.models.prior import find_weights, load_prior, save_prior
 from motionloom_lab.suites.harness import weight_marks
 from motionloom_lab.suites.obey import in_a_sentence
 

@@ -25,17 +25,17 @@ from typing import Any
 import numpy as np
 import torch
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.io import load
-from motionloom.io.atomic import atomic_path
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom.motion import Motion
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
 from motionloom.viz.video import draw_sheet
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior
 from motionloom_lab.suites import obey
 from motionloom_lab.suites.harness import Run
 from motionloom_train.data.examples import CaptionedClip, make_examples, uniform_positions

@@ -31,7 +31,7 @@ from safetensors.numpy import load_file
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.runtime.text.minilm import MiniLM
+from motionloom.core.models.networks.text.minilm import MiniLM
 from motionloom_train.modules import text_encoder
 from motionloom_train.nets.text.hub import open_pretrained
 

@@ -16,15 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
+from motionloom.core.models.prior import Prior, find_weights
+from motionloom.core.motion import Motion
 from motionloom.goals.segment import Segment
 from motionloom.goals.sequence import split_actions, usual_seconds
 from motionloom.kinematics.physics import Array
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.long import compose_takes
 from motionloom.tasks.reattempts import reattempt
 from motionloom.tasks.redraw import Timed
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.obedience import Check, chosen, in_words
 from motionloom_lab.suites.harness import weight_marks
 

@@ -11,9 +11,9 @@ import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
+from motionloom.core.models.prior import Prior
 from motionloom.goals.remarks import nearest_known
 from motionloom.goals.sequence import split_actions
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import EVERYDAY, in_words
 from motionloom_train.data.sets import read_clips
 

@@ -23,19 +23,19 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.models.prior import Prior, find_weights
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import Skeleton
 from motionloom.goals.goal_file import read_goal
 from motionloom.io import save
-from motionloom.io.atomic import atomic_path
 from motionloom.kinematics import physics
-from motionloom.motion import Motion
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import Skeleton
 from motionloom.tasks.control import Controlled, control
 from motionloom.tasks.text import generate
 from motionloom.viz.video import draw_sheet
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.skate import skate
 from motionloom_lab.suites.harness import weight_marks
 

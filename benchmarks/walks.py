@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom.kinematics.gestures import torso_inclination
 from motionloom.kinematics.physics import ANKLES, WRISTS, Array, J, in_body, speed, turn
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.suites.harness import weight_marks
 from motionloom_lab.suites.items import real_clips
 

@@ -5,10 +5,10 @@ python examples/02_files.py
 
 import numpy as np
 
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import load, save
-from motionloom.motion import Motion
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import SMPL22
 
 # Two seconds of a T-posed person who turns once about the vertical axis and raises the left arm.
 frames, fps = 60, 30.0

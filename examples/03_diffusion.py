@@ -8,7 +8,7 @@ loop, the solvers and one edit of each kind on a problem with a known answer. Ne
 
 import numpy as np
 
-from motionloom.diffusion import Ddim, DpmSolver2M, cosine, inpaint, levels, observe, row_noise, run
+from motionloom.core.diffusion import Ddim, DpmSolver2M, cosine, inpaint, levels, observe, row_noise, run
 
 POINTS = np.array([-1.0, 3.0])
 schedule = cosine(1000)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import Goal, Prior, control, save
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import merged
 from motionloom.goals.goal_file import read_goal, root_path
-from motionloom.skeleton import SMPL22
 
 frames = 60  # 3 s at 20 frames per second
 

@@ -8,8 +8,8 @@ DiffusionBlending (Shafir et al. 2024, section 4.3). Without shipped adapters th
 from pathlib import Path
 
 from motionloom import Prior, control, save
+from motionloom.core.models.adapter import Adapter, adapters
 from motionloom.goals.goal_file import read_goal
-from motionloom.weights.adapter import Adapter, adapters
 
 prior = Prior.load()
 goal = read_goal(

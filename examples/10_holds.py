@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import SMPL22, Goal, Prior, load, save
-from motionloom.diffusion import DDPM, chain, guide, inpaint, levels, observe, row_noise, run
+from motionloom.core.diffusion import DDPM, chain, guide, inpaint, levels, observe, row_noise, run
+from motionloom.core.features import humanml, layout
 from motionloom.edits.steering import corrected, toward
-from motionloom.features import humanml, layout
 from motionloom.tasks.splice import person_at_20
 from motionloom.tasks.text import finish
 

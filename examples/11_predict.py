@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import load, save
+from motionloom.core.models.predictor import Predictor
 from motionloom.goals.hold import FixedJoints
 from motionloom.goals.mask_file import read_mask
 from motionloom.tasks.predict import predict, switch
 from motionloom.viz.overlay import draw_futures
-from motionloom.weights.predictor import Predictor
 
 here = Path(__file__).parent
 predictor = Predictor.load()

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import Prior, load
+from motionloom.core.models.pair import PairBlock
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.timeline import read_timeline
 from motionloom.io import save_scene
 from motionloom.tasks.duet import compose_pair, react
 from motionloom.tasks.pair import complete_pair, generate_pair
-from motionloom.weights.pair import PairBlock
 
 here = Path(__file__).parent
 prior = Prior.load()

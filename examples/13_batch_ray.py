@@ -13,7 +13,7 @@ import numpy as np
 
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.row import parse
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 
 class Motions:

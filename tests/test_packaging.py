@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli.commands import FAMILIES, GROUP, OTHERS
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 ROOT = Path(__file__).parents[1]
 BUILD = runpy.run_path(str(ROOT / "setup.py"), run_name="setup")

@@ -100,7 +100,7 @@ def test_a_command_loads_no_more_than_it_needs(command: str, tmp_path: Path) -> 
 def test_importing_the_package_imports_no_library() -> None:
     """`import motionloom` knows its public names and imports what is behind them when they are asked for."""
     found = loaded(code="import sys, motionloom; print('LOADED', *sys.modules)")
-    assert not found & {"torch", "numpy", "safetensors", "motionloom.motion"}
+    assert not found & {"torch", "numpy", "safetensors", "motionloom.core.motion"}
     found = loaded(code="import sys; from motionloom import Motion, SMPL22, load; print('LOADED', *sys.modules)")
     assert "numpy" in found
     assert "torch" not in found

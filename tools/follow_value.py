@@ -25,15 +25,15 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "packages/motionloom"))
 
 from motionloom import Predictor, Prior, Skeleton, load, predict
-from motionloom.diffusion import Schedule
+from motionloom.core.diffusion import Schedule
+from motionloom.core.models.networks.pair import PairSession
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.pair import PairBlock
 from motionloom.goals.goal_file import read_goal
 from motionloom.io.character import load_character
 from motionloom.retarget import retarget
-from motionloom.runtime.pair import PairSession
-from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.control import control
 from motionloom.tasks.duet import react
-from motionloom.weights.pair import PairBlock
 from tests.io.rigged import Hero
 from tests.recorded import tiny
 from tests.tasks.small_predictor import small_predictor

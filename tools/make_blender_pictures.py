@@ -22,9 +22,9 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
+from motionloom.core.motion import Motion
 from motionloom.io import save
 from motionloom.io.character import load_character
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from tests.addon.studio import Studio, archive
 from tests.io.rigify import make_rig
@@ -161,8 +161,8 @@ def kept(picture: Image.Image, name: str) -> None:
 
 def walk() -> Motion:
     """A walk of the shipped weights, as `motionloom generate "a person walks forward" --seed 1` makes it."""
+    from motionloom.core.models.prior import Prior
     from motionloom.tasks.text import generate
-    from motionloom.weights.prior import Prior
 
     (motion,) = generate(Prior.load("default"), "a person walks forward", seconds=3.0, seed=1)
     return motion.resample(30.0)

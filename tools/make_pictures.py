@@ -11,11 +11,11 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from motionloom.cli import main
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import Goal
 from motionloom.goals.goal_file import read_goal
 from motionloom.io import load
-from motionloom.io.atomic import atomic_path
-from motionloom.motion import Motion
 from motionloom.viz import draw
 from motionloom.viz.figure import figure
 

@@ -17,13 +17,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
 from motionloom.cli import main
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.motion import Motion
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.models.prior import save_prior
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22
 from motionloom.retarget import to_smpl22
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
-from motionloom.weights.predictor import save_predictor
-from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import tiny_predictor
 from tests.recorded import tiny
 from tests.tasks.two_people import block

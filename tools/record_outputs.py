@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "packages/motionloom"))
 
-from motionloom.io.atomic import atomic_path
+from motionloom.core.files.atomic import atomic_path
 from tests.outputs.commands import COMMANDS, RECORDED, ROOT, places, sampled
 
 SAME = 1e-6

@@ -3,7 +3,7 @@
 To be done after a network or `motionloom_train.export` has changed; weights and their digests stay as they are.
 """
 
-from motionloom.weights.container import PAIRS, PREDICTORS, PRIORS, weights_digest
+from motionloom.core.models.container import PAIRS, PREDICTORS, PRIORS, weights_digest
 from motionloom_train.convert import convert
 
 

@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from motionloom.cli import main
-from motionloom.diffusion import DDPM, cosine
-from motionloom.errors import MotionloomError
-from motionloom.runtime.text.protocol import TextEmbedding
-from motionloom.weights.prior import Card, Prior
+from motionloom.core.diffusion import DDPM, cosine
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.text.protocol import TextEmbedding
+from motionloom.core.models.prior import Card, Prior
 from motionloom_lab import bench
 from motionloom_lab.bench import long, prediction, speed
 from motionloom_train.modules import prior_session

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from motionloom.diffusion import DDPM, SPACINGS, Ddim, DpmSolver2M, levels, run
-from tests.diffusion.exact import shared_draw, wavy
-from tests.diffusion.test_solvers import noises_of, ours, schedule
+from motionloom.core.diffusion import DDPM, SPACINGS, Ddim, DpmSolver2M, levels, run
+from tests.core.diffusion.exact import shared_draw, wavy
+from tests.core.diffusion.test_solvers import noises_of, ours, schedule
 
 __all__ = ["schedule"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import torch
 
-from motionloom.diffusion import SCHEDULES
-from motionloom.features import humanml as hml
+from motionloom.core.diffusion import SCHEDULES
+from motionloom.core.features import humanml as hml
 from motionloom_train.data.batches import Batches
 from motionloom_train.data.clips import Clip, Note, write_clip
 from motionloom_train.data.sets import load_set

@@ -7,9 +7,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from motionloom.runtime import prior_condition
-from motionloom.runtime.prior import PriorSession
-from motionloom.weights.adapter import GIVEN, Adapter, adapted, fingerprint, layers
+from motionloom.core.models.adapter import GIVEN, Adapter, adapted, fingerprint, layers
+from motionloom.core.models.networks import prior_condition
+from motionloom.core.models.networks.prior import PriorSession
 from motionloom_train.low_rank import AdapterNet, Controlled, linears, tensors_of
 from motionloom_train.modules import prior_module, prior_session
 from motionloom_train.nets.prior import Condition, NetConfig, PriorNet, condition

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.weights.prior import Prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior
 from motionloom_train.average import averaged
 from tests.recorded import tiny
 

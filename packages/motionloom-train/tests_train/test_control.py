@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from motionloom.cli import main
-from motionloom.diffusion import cosine
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import mask, ric
-from motionloom.skeleton import SMPL22
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior, read_tensors, save_prior
+from motionloom.core.diffusion import cosine
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import mask, ric
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.prior import Prior, read_tensors, save_prior
+from motionloom.core.skeleton import SMPL22
 from motionloom_train.control import CONTROLS, NOTHING, ControlledError, draw_masks, some_frames, train_control
 from motionloom_train.data.batches import Batches
 from motionloom_train.data.sets import load_set

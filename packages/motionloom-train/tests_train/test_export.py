@@ -8,15 +8,15 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from motionloom.diffusion import cosine
-from motionloom.features.pair import PlaceCode
-from motionloom.runtime import prior_condition
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.runtime.shapes import pair_shapes, predictor_shapes, prior_shapes
-from motionloom.weights.adapter import Adapter, adapted, adapters
-from motionloom.weights.pair import PairBlock, blocks
-from motionloom.weights.predictor import Predictor, shipped_predictors
-from motionloom.weights.prior import Prior, shipped
+from motionloom.core.diffusion import cosine
+from motionloom.core.features.pair import PlaceCode
+from motionloom.core.models.adapter import Adapter, adapted, adapters
+from motionloom.core.models.networks import prior_condition
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.networks.shapes import pair_shapes, predictor_shapes, prior_shapes
+from motionloom.core.models.pair import PairBlock, blocks
+from motionloom.core.models.predictor import Predictor, shipped_predictors
+from motionloom.core.models.prior import Prior, shipped
 from motionloom_train.low_rank import Controlled
 from motionloom_train.low_rank import adapted as adapted_module
 from motionloom_train.modules import (

@@ -11,8 +11,8 @@ import torch
 from safetensors import safe_open
 from torch import nn
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import save_tensors
 from motionloom_train import loop
 from motionloom_train.loop import Average, load_state, make_optimizer, rate_at, save_state
 from motionloom_train.objectives import masked_error

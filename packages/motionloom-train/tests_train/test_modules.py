@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_train.modules import fill, shapes
 
 

@@ -7,10 +7,10 @@ import pytest
 import torch
 from torch import nn
 
-from motionloom.diffusion import SCHEDULES
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FEET, LAYOUT, ric
-from motionloom.features.representation import BABEL
+from motionloom.core.diffusion import SCHEDULES
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FEET, LAYOUT, ric
+from motionloom.core.features.representation import BABEL
 from motionloom_train.data.batches import Batches
 from motionloom_train.data.sets import load_set
 from motionloom_train.nets.prior import Condition

@@ -7,10 +7,10 @@ import pytest
 import torch
 from torch import nn
 
-from motionloom.features import humanml as hml
-from motionloom.features.layout import LAYOUT
-from motionloom.features.pair import decode, encode
-from motionloom.weights.prior import Prior
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.features.pair import decode, encode
+from motionloom.core.models.prior import Prior
 from motionloom_train.data.pairs import Pair, mirrored
 from motionloom_train.duets import KEEN, NEAR, Duets, Sight
 from motionloom_train.modules import prior_module

@@ -8,7 +8,7 @@ import torch
 from safetensors import safe_open
 from torch import nn
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_train import loop, precision
 from motionloom_train.low_rank import AdapterNet
 from motionloom_train.modules import prior_module

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_train.recipe import Recipe, changes, load_recipe
 
 ROOT = Path(__file__).parents[3]

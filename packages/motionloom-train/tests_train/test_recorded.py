@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.runtime import prior_condition
+from motionloom.core.models.networks import prior_condition
 from motionloom_train.modules import arrays, pair_module, predictor_module, prior_module
 from motionloom_train.nets.pair import Talk
 from motionloom_train.nets.prior import Condition

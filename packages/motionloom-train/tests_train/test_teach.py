@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import ric
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.runtime.text.known import known_sentences
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import ric
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.networks.text.known import known_sentences
+from motionloom.core.models.prior import Prior
 from motionloom_train import teach as module
 from motionloom_train.data.examples import CaptionedClip, Example, make_examples
 from motionloom_train.low_rank import AdapterNet

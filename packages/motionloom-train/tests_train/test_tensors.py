@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom import blending, ground
-from motionloom.features import babel, humanml, pair
-from tests.features.test_humanml import person
-from tests.features.test_pair import CODES, people
+from motionloom.core import blending, ground
+from motionloom.core.features import babel, humanml, pair
+from tests.core.features.test_humanml import person
+from tests.core.features.test_pair import CODES, people
 
 
 def test_ground_poses() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom import blending
+from motionloom.core import blending
 
 
 @pytest.mark.parametrize(("fade", "flat"), [(blending.smoothstep, 1), (blending.smootherstep, 2)])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from motionloom import cli, formats, io
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 
 FORMATS = sorted(formats.FORMATS)
 

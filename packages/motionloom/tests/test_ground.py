@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom import ground
-from motionloom.ground import GroundPose
+from motionloom.core import ground
+from motionloom.core.ground import GroundPose
 
 metres, radians = st.floats(-10, 10), st.floats(-3, 3)
 poses = st.builds(GroundPose, metres, metres, radians)

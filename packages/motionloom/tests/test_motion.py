@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 
 EVEN = Skeleton(
     SMPL22.names, SMPL22.parents, (SMPL22.offsets + SMPL22.offsets[list(SMPL22.mirror_pairs())] * [-1, 1, 1]) / 2

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import parse_json, stored_json
-from motionloom.reading import check_text, check_texts, mended, whole_number
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json, stored_json
+from motionloom.core.reading import check_text, check_texts, mended, whole_number
 
 ANY = st.text(st.characters(exclude_categories=()), max_size=12)
 """Every code point, halves of surrogate pairs included."""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
 
 vectors = arrays(np.float64, (5, 3), elements=st.floats(-3.0, 3.0))
 RANDOM = rot.normalize(np.random.default_rng(0).normal(size=(4, 6, 4)))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.skeleton import HUMANML_BONE_LENGTHS, SMPL22, Skeleton
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import HUMANML_BONE_LENGTHS, SMPL22, Skeleton
 
 REST = dict(zip(SMPL22.names, SMPL22.rest_positions()))
 

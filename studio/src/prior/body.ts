@@ -1,4 +1,4 @@
-/** Places of 22 joints to a person with constant bones and true turns (`motionloom.kinematics.ik`). */
+/** Places of 22 joints to a person with constant bones and true turns (`motionloom.core.body.ik`). */
 
 import { aim, solveLimbs, withKneesAhead } from "./limbs";
 import {

@@ -1,4 +1,4 @@
-/** The 263 numbers of HumanML3D to places (`motionloom.features.humanml`). */
+/** The 263 numbers of HumanML3D to places (`motionloom.core.features.humanml`). */
 
 import type { Vec } from "./turns";
 

@@ -1,4 +1,4 @@
-/** Planted feet stay put, and no foot is under the floor (`motionloom.kinematics.feet`). */
+/** Planted feet stay put, and no foot is under the floor (`motionloom.core.body.feet`). */
 
 import { eachJoint, percentile } from "./body";
 import { aim, hingeFrame, reach } from "./limbs";

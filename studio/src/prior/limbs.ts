@@ -1,4 +1,4 @@
-/** Arms and legs from places: two bones, and a hinge whose turn about the limb is smooth (`motionloom.kinematics.ik`). */
+/** Arms and legs from places: two bones, and a hinge whose turn about the limb is smooth (`motionloom.core.body.ik`). */
 
 import { unwrapAngles } from "./dense";
 import { LENGTHS, LIMBS, type Limb, REST } from "./person";

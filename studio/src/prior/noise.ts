@@ -13,7 +13,7 @@ const MULTIPLIER = 0x2360ed051fc65da44385df649fccf645n;
 const wordsOf = (number: bigint): number[] =>
   [number, number >> 32n].slice(0, number > M32 ? 2 : 1).map((x) => Number(x & M32));
 
-/** A seed for one more try of what has a seed (`motionloom.diffusion.sampling.row_seed`). */
+/** A seed for one more try of what has a seed (`motionloom.core.diffusion.sampling.row_seed`). */
 export function rowSeed(seed: number, number: number): bigint {
   const [low, high] = seeded([...wordsOf(BigInt(seed)), number, 0]).map(BigInt) as [bigint, bigint];
   return (((high << 32n) | low) >> 1n) & ((1n << 62n) - 1n);

@@ -1,4 +1,4 @@
-/** The uniform person: bones, limbs, and forward kinematics (`motionloom.skeleton.SMPL22`). */
+/** The uniform person: bones, limbs, and forward kinematics (`motionloom.core.skeleton.SMPL22`). */
 
 import { COUNT, HEAD, LEFT, NECK, PARENTS, PELVIS, RIGHT, SPINE1, SPINE2, SPINE3 } from "../body/skeleton";
 import { type Turn, type Vec, add, norm, rotate, scaled, times, unit } from "./turns";

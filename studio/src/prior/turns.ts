@@ -1,4 +1,4 @@
-/** Vectors and unit quaternions (w, x, y, z), as `motionloom.rotations` has them. */
+/** Vectors and unit quaternions (w, x, y, z), as `motionloom.core.rotations` has them. */
 
 export type Vec = readonly [number, number, number];
 export type Turn = readonly [number, number, number, number];

@@ -1,4 +1,4 @@
-/** A motion as BVH, as `motionloom.io.bvh_writer` writes it: metres, channels Z X Y. */
+/** A motion as BVH, as `motionloom.core.files.bvh_writer` writes it: metres, channels Z X Y. */
 
 import { JOINTS, PARENTS } from "../body/skeleton";
 import { type Body, REST } from "../prior/person";

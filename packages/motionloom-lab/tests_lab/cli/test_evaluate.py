@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
 from motionloom_lab.report.report import Column, Report, Row, Value, encode, read
 from motionloom_lab.suites.registry import Suite, Tools, chosen
 from motionloom_train.data.clips import Clip, Note, write_clip

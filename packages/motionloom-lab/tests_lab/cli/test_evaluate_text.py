@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import main
-from motionloom.weights.prior import save_prior
+from motionloom.core.models.prior import save_prior
 from motionloom_lab.suites import text_reference
 from motionloom_lab.suites.protocol import Selection
 from motionloom_train.data.clips import Clip, Note, write_clip

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from motionloom.cli import main
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import load_prior
 from motionloom.io import load
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import load_prior
 from motionloom_lab.papers.guo import load_guo
 from tests.tasks.test_text import Words
 from tests_lab.nets import test_pair

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from motionloom.cli import main
-from motionloom.weights.predictor import Predictor
+from motionloom.core.models.predictor import Predictor
 from tests_lab.papers.test_humanmac_checkpoint import checkpoint
 from tests_lab.papers.test_mdm import Bomb
 

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.diffusion import DDPM, Denoiser, cosine
-from motionloom.features.layout import mask
-from motionloom.runtime.prior_condition import condition
-from motionloom.tasks.control import blended
-from motionloom.tasks.sampling import Observed
-from motionloom_lab.papers.diffusion_blending import controlled
+from motionloom.core.diffusion import DDPM, Denoiser, cosine
+from motionloom.core.features.layout import mask
+from motionloom.core.methods.blending import blended
+from motionloom.core.methods.edit import Observed, controlled
+from motionloom.core.models.networks.prior_condition import condition
 from motionloom_lab.papers.mdm import from_published
 from motionloom_train.modules import prior_session
 from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights

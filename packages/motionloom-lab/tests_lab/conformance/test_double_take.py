@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from motionloom.diffusion import cosine, guide
-from motionloom_lab.papers.double_take import MODES, Plan, Takes, double_take, flags
+from motionloom.core.diffusion import cosine, guide
+from motionloom.core.methods.double_take import MODES, Plan, Takes, double_take, flags
 from tests.conformance.runner import Case, cases, compare
 from tests_lab.conformance.test_sampling import dummy, published_network, recorded_draw, to_motion
 

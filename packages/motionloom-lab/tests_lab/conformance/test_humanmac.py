@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.diffusion import SCHEDULES, Dct, NoiseSource, Schedule, from_betas, from_noise
-from motionloom.runtime.predictor import PredictorConfig, PredictorSession
-from motionloom_lab.papers.humanmac import PARTS, Fixed, Padding, SwitchTarget, padded, published_completion
+from motionloom.core.diffusion import SCHEDULES, Dct, NoiseSource, Schedule, from_betas, from_noise
+from motionloom.core.methods.humanmac import PARTS, Fixed, Padding, SwitchTarget, padded, published_completion
+from motionloom.core.models.networks.predictor import PredictorConfig, PredictorSession
 from motionloom_train.modules import predictor_session
 from motionloom_train.nets.predictor import TransLinear, waves
 from tests.conformance import runner

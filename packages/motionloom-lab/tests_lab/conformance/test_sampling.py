@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.diffusion import (
+from motionloom.core.diffusion import (
     DDPM,
     Denoiser,
     NoiseSource,
@@ -24,7 +24,7 @@ from motionloom.diffusion import (
     restart,
     run,
 )
-from motionloom.runtime.prior_condition import condition
+from motionloom.core.models.networks.prior_condition import condition
 from motionloom_lab.papers.mdm import from_published
 from motionloom_train.modules import prior_session
 from tests.conformance.runner import KNOWN, MASK, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights

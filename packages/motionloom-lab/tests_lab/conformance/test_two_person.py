@@ -10,7 +10,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from motionloom.diffusion import DDPM, Denoiser, chain, cosine, inpaint, observe, restart, run
+from motionloom.core.diffusion import DDPM, Denoiser, chain, cosine, inpaint, observe, restart, run
 from motionloom_lab.papers.mdm import from_published_pair
 from motionloom_train.nets.pair import PairNet
 from motionloom_train.nets.prior import condition

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import MAX_TENSORS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import MAX_TENSORS
 from motionloom_lab.suites.items import read_items
 from motionloom_lab.suites.protocol import Selection
 from motionloom_train.data.build import build

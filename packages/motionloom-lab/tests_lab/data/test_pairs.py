@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.skeleton import HUMANML_BONE_LENGTHS
 from motionloom.io import save
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics import shared_world
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.skeleton import HUMANML_BONE_LENGTHS
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.papers import readers, threedpw
 from motionloom_train.data import pairs as dp

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features.pair import encode
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.pair import encode
 from motionloom_lab.papers import readers, threedpw
 from tests_lab.data.test_pairs import walkers
 

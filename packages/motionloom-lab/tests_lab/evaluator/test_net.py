@@ -9,10 +9,10 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import LAYOUT
-from motionloom.runtime.text.minilm import pack
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.models.networks.text.minilm import pack
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.evaluator.net import (
     INPUTS,

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.representation import HUMANML3D
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.representation import HUMANML3D
 from motionloom_lab.evaluator import own
 from motionloom_lab.evaluator.agreement import Scored, agreement, within_prompts
 from motionloom_lab.evaluator.evaluators import Caption, load_evaluator

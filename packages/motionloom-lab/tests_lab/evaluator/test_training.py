@@ -8,10 +8,10 @@ import torch
 from torch.nn import functional as F
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import WIDTH
-from motionloom.weights.prior import save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import WIDTH
+from motionloom.core.models.prior import save_prior
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.evaluator.net import load_embedder
 from motionloom_lab.evaluator.pairs import PairBatch, Pairs, backwards, contrary, negatives, opposed, senses

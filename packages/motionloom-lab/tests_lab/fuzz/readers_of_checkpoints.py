@@ -63,7 +63,7 @@ def read_checkpoint(name: str) -> Callable[[Path], object]:
 
 
 def humanmac(folder: Path) -> None:
-    from motionloom.runtime.predictor import PredictorConfig
+    from motionloom.core.models.networks.predictor import PredictorConfig
     from motionloom_train.nets.predictor import TransLinear
 
     net = TransLinear(PredictorConfig(channels=48, kept=20, layers=2, width=16, heads=2))

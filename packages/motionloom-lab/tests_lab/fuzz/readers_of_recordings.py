@@ -11,9 +11,9 @@ import numpy as np
 import torch
 
 from motionloom import io
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from tests.fuzz.reader import reader, say
 from tests.fuzz.readers_of_motions import looked_at, motion, text_file, two_texts
 

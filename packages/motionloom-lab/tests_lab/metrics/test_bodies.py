@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics.physics import J
-from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics import bodies
 from motionloom_lab.suites import bodies as suite
 from tests.kinematics.people import standing, walking

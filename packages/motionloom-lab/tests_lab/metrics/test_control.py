@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics import control
 from tests.kinematics.people import standing
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.remarks import is_english
 from motionloom.kinematics.physics import J
-from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.everyday.body import Body, times
 from motionloom_lab.metrics.obedience import EVERYDAY, SETS, THEMES, chosen
 from tests.kinematics.people import FPS, jumping, moved, spun, standing, walking

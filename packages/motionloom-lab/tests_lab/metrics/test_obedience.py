@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from motionloom.bulk.measures import find_judge
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.runtime.text.known import nearest
-from motionloom.skeleton import SMPL22
-from motionloom.weights.prior import Prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.text.known import nearest
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom_lab.metrics.actions import MEANING
 from motionloom_lab.metrics.obedience import CHECKS, Bound, check
 

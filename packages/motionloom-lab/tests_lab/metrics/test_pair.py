@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import capsules
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import J
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 from motionloom.viz.figure import figure
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.metrics import pair_groups as groups

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics import prediction as pr
 from tests_lab.metrics.futures import SIZES, SMALL, pose_distance, random_window
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.skeleton import SMPL22
+from motionloom.core.skeleton import SMPL22
 from motionloom_lab.metrics import prediction as pr
 from tests_lab.metrics.futures import SIZES, SMALL, pose_distance, random_window
 

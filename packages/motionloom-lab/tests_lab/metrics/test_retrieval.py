@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics import retrieval
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.kinematics.physics import J
 from motionloom_lab.metrics.skate import Skate, skate, slide
 from tests.kinematics.people import FPS, clock, moved, standing, walking

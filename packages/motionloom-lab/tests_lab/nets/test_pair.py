@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from safetensors.numpy import save_file
 from torch import Tensor
 
-from motionloom.diffusion import DDPM, guide, inpaint, levels, observe, row_noise, run
-from motionloom.errors import MotionloomError
-from motionloom.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, from_world, relative
-from motionloom.runtime import pair as runtime_pair
-from motionloom.runtime.prior_condition import Bound as arrays_of
-from motionloom.weights import pair as pair_block
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.container import PAIRS, graph_tensors
-from motionloom.weights.pair import PairBlock, blocks
+from motionloom.core.diffusion import DDPM, guide, inpaint, levels, observe, row_noise, run
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, from_world, relative
+from motionloom.core.models import pair as pair_block
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.container import PAIRS, graph_tensors
+from motionloom.core.models.networks import pair as runtime_pair
+from motionloom.core.models.networks.prior_condition import Bound as arrays_of
+from motionloom.core.models.pair import PairBlock, blocks
 from motionloom_lab.papers.mdm import adds_of, from_published_pair, is_pair
 from motionloom_lab.papers.published_priors import import_block
 from motionloom_train.export import pair_graph

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.papers.amass import AMASS_SETS, AMASS_SPEEDS, UNIFORM, read_amass, set_name
 from motionloom_lab.papers.benchmarks import (
     find_protocol,

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import babel as codec
-from motionloom.features.babel import decode
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import babel as codec
+from motionloom.core.features.babel import decode
+from motionloom.core.motion import Motion
 from motionloom_lab.papers import babel
 from motionloom_lab.papers.babel import Recording, Segment
 from motionloom_lab.papers.readers import find_takes

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import BABEL, HUMANML3D
-from motionloom.weights.prior import load_prior, save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import BABEL, HUMANML3D
+from motionloom.core.models.prior import load_prior, save_prior
 from motionloom_lab.evaluator.evaluators import Caption, load_evaluator
 from motionloom_lab.papers import babel
 from motionloom_lab.report import report

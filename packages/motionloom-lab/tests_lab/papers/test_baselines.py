@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics.physics import heading
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 from motionloom_lab.papers.baselines import slerp_joined
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom.core.features.positions import SMPL_LAYOUT, Layout
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
-from tests.features.test_positions import people
+from tests.core.features.test_positions import people
 
 
 def test_benchmarks_have_the_published_channels_and_sides() -> None:

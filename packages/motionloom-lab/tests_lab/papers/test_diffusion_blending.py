@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.diffusion import SOLVERS, cosine, guide, levels, row_noise, run
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import mask
-from motionloom.tasks.sampling import Observed
-from motionloom.weights.adapter import adapted
-from motionloom_lab.papers.diffusion_blending import control_features, controlled
+from motionloom.core.diffusion import SOLVERS, cosine, guide, levels, row_noise, run
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import mask
+from motionloom.core.methods.blending import control_by_blending
+from motionloom.core.methods.edit import Observed, controlled
+from motionloom.core.methods.walk import Walk
+from motionloom.core.models.adapter import adapted
+from motionloom.edits.steering import corrected
 from motionloom_train.modules import prior_module
 from tests.noise import normal
 from tests.recorded import tiny
@@ -38,7 +40,11 @@ def known_part(names: str = "left_wrist,root_horizontal") -> tuple[np.ndarray, n
 
 def draw_of(prior, nets, known, flags, **options):
     observed = Observed(known, flags, options.pop("noise_free", True))
-    return control_features(prior, nets, PROMPTS, observed, seeds=[5, 6], **({"steps": 6} | options))
+    corrections = options.pop("corrections", None)
+    edited = None if corrections is None else lambda denoise: corrected(denoise, corrections)
+    walk = Walk(**{name: options.pop(name) for name in ("steps", "solver") if name in options} or {"steps": 6})
+    seeds = options.pop("seeds", [5, 6])
+    return control_by_blending(prior, nets, PROMPTS, observed, seeds=seeds, edited=edited, walk=walk, **options)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -153,7 +159,9 @@ def test_an_empty_mask_is_plain_sampling(prior):
 def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_given(prior, other):
     known, flags = known_part()
     both = draw_of(prior, [other], known, flags)
-    alone = control_features(prior, [other], PROMPTS[1:], Observed(known[1:], flags[1:], True), seeds=[6], steps=6)
+    alone = control_by_blending(
+        prior, [other], PROMPTS[1:], Observed(known[1:], flags[1:], True), seeds=[6], walk=Walk(steps=6)
+    )
     np.testing.assert_allclose(both[1:], alone, rtol=1e-4, atol=1e-5)
     hidden = np.where(flags, known, 1e6)
     assert np.array_equal(draw_of(prior, [other], hidden, flags), both)
@@ -199,5 +207,5 @@ def test_what_does_not_fit_together_is_refused_in_a_sentence(prior, mistake):
     options = {"nets": [prior.net], "known": known, "mask": flags, "seeds": [1, 2]} | mistake(known, flags)
     observed = Observed(options.pop("known"), options.pop("mask"), noise_free=True)
     with pytest.raises(MotionloomError) as caught:
-        control_features(prior, prompts=PROMPTS, observed=observed, **options)
+        draw_of(prior, options.pop("nets"), observed.values, observed.mask, **options)
     assert "\n" not in str(caught.value)

@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.diffusion import DDPM, cosine, levels, row_noise, run
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.runtime.prior import PriorSession
-from motionloom.tasks.text import sample_features
-from motionloom_lab.papers.double_take import (
+from motionloom.core.diffusion import DDPM, cosine, levels, row_noise, run
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.methods.double_take import (
     MODES,
     Keep,
     Mode,
@@ -26,6 +24,8 @@ from motionloom_lab.papers.double_take import (
     sandwiches,
     unfold,
 )
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.tasks.text import sample_features
 from tests.recorded import tiny
 
 SCHEDULE, CHANNELS = cosine(20), 3
@@ -158,7 +158,7 @@ def test_one_interval_is_plain_sampling_with_the_same_noise() -> None:
 
 def test_the_first_handshake_frame_is_the_previous_rows_and_the_last_nearly_the_next_ones() -> None:
     """Weights 0 and (h - 1)/h, seen on a state of zeros and ones."""
-    from motionloom_lab.papers.double_take import handshakes
+    from motionloom.core.methods.double_take import handshakes
 
     plan = Plan.of([70, 70], 20, 10)
     x = np.stack([np.zeros((70, 1), np.float32), np.ones((70, 1), np.float32)])

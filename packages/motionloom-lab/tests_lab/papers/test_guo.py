@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.torch import load_file, save_file
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.papers.guo import GuoEvaluator, is_guo, load_guo, read_published, save_guo, tokens_of
 from motionloom_lab.papers.guo_nets import GuoSizes, from_state_dict

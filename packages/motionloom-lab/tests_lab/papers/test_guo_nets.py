@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.papers.guo_nets import GuoNets, GuoSizes, from_state_dict, published_order, read_guo
 from tests_lab.papers.test_mdm import Bomb
 

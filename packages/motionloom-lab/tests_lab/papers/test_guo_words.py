@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.papers.guo_words import SPECIAL, TAGS, Words, padded, read_flat, read_special, read_words
 from tests_lab.papers.test_mdm import Bomb
 

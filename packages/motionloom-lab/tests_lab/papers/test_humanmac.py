@@ -8,10 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from motionloom.diffusion import Dct, Schedule, cosine, row_noise
-from motionloom.errors import MotionloomError
-from motionloom.weights.predictor import Predictor
-from motionloom_lab.papers.humanmac import (
+from motionloom.core.diffusion import Dct, Schedule, cosine, row_noise
+from motionloom.core.errors import MotionloomError
+from motionloom.core.methods.humanmac import (
     PARTS,
     Fixed,
     SwitchTarget,
@@ -21,6 +20,7 @@ from motionloom_lab.papers.humanmac import (
     published_futures,
     published_levels,
 )
+from motionloom.core.models.predictor import Predictor
 from motionloom_train.nets.predictor import TransLinear
 from tests.noise import normal
 from tests.recorded.tiny_predictor import predictor

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.weights.predictor import Predictor, save_predictor
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.predictor import Predictor, save_predictor
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom_lab.papers.published_priors import import_humanmac, is_humanmac
 from motionloom_train.nets.predictor import TransLinear

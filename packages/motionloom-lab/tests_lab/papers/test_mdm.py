@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.text.published import PublishedText
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.text.published import PublishedText
 from motionloom_lab.papers.mdm import describe, from_published, own_name, read_published
 
 State = dict[str, Tensor]

@@ -9,7 +9,7 @@ import torch
 from scipy.fft import idct
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.papers.mrt import RECIPE, Mrt, MrtConfig, MrtFile, Seconds, _nearness, completed, train_mrt
 from motionloom_train.data.pairs import Pair
 from motionloom_train.loop import Training

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.weights.predictor import save_predictor
+from motionloom.core.models.predictor import save_predictor
 from tests_lab.suites.test_prediction_joints import of_h36m, retargeted
 
 PAPERS = Path(__file__).resolve().parents[4] / "examples" / "papers"

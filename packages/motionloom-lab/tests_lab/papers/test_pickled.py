@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.papers.benchmarks import (
     read_h36m,
 )

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.papers.plain_pickle import MAX_DEPTH, read_plain, read_plain_file
 from tests.work import work
 

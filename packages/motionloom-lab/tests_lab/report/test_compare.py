@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.report import compare as cmp
 from motionloom_lab.report.report import Better, Column, Report, Row, Value, encode
 

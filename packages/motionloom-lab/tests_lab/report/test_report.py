@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.report.report import Column, Report, Row, Value, decode, encode, markdown, plain, read, write
 
 FID = Column("fid", "FID", "down", "distance to real")

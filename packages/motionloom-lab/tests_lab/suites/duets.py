@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.pair import PairBlock
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.pair import PairBlock
 from motionloom_train.data.pairs import Pair
 from motionloom_train.export import pair_graph
 from motionloom_train.modules import arrays

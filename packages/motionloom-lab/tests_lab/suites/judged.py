@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motionloom.features.representation import HUMANML3D
+from motionloom.core.features.representation import HUMANML3D
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.suites.items import Item
 

@@ -3,12 +3,12 @@
 import numpy as np
 import torch
 
-from motionloom.diffusion import SCHEDULES, Dct
-from motionloom.features.positions import SMPL_LAYOUT, Layout
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.skeleton import SMPL22
-from motionloom.weights.predictor import Predictor, condition_shape
-from motionloom.weights.prior import Card
+from motionloom.core.diffusion import SCHEDULES, Dct
+from motionloom.core.features.positions import SMPL_LAYOUT, Layout
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.predictor import Predictor, condition_shape
+from motionloom.core.models.prior import Card
+from motionloom.core.skeleton import SMPL22
 from motionloom_train.data.prediction import Protocol, Recording
 from motionloom_train.modules import predictor_session
 from motionloom_train.nets.predictor import TransLinear

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT, mask
-from motionloom.features.representation import HUMANML3D
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT, mask
+from motionloom.core.features.representation import HUMANML3D
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import physics
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.skeleton import SMPL22
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.report import report
 from motionloom_lab.suites import control, control_kinds

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.weights.prior import Prior, save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior, save_prior
 from motionloom_lab.suites.control_kinds import kind
 from motionloom_lab.suites.control_methods import BLENDING, TUNED, maker, trained_controls
 from motionloom_lab.suites.protocol import Drawing

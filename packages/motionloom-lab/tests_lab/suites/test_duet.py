@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
-from motionloom.features.pair import PairMotion
-from motionloom.runtime.prior_condition import condition
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.container import weights_digest
-from motionloom.weights.pair import PairBlock
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.networks.prior_condition import condition
+from motionloom.core.models.pair import PairBlock
 from motionloom_lab.papers.mrt import Mrt, MrtConfig, MrtFile
 from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import REAL

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.kinematics.ik import motion_from_positions
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.report import report as reports
 from motionloom_lab.suites import duet_answers, duet_long, duet_text

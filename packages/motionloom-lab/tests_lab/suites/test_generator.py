@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.diffusion import cosine
-from motionloom.features import humanml
+from motionloom.core.diffusion import cosine
+from motionloom.core.features import humanml
+from motionloom.core.models.networks.text.protocol import TextEmbedding
+from motionloom.core.models.prior import Card, Prior
 from motionloom.kinematics.physics import bone_length_error
-from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.tasks.text import generate, sample_features
-from motionloom.weights.prior import Card, Prior
 from motionloom_lab.suites.commands import sampling_of
 from motionloom_lab.suites.harness import generator
 from motionloom_train.modules import prior_session

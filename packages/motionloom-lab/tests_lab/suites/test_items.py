@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import save_file
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.suites import items, text_reference
 from motionloom_lab.suites.harness import averaged

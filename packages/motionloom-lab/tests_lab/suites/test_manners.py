@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
 from motionloom_lab.suites import manners
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.clips import MANNER, Clip, Note

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.predictor import save_predictor
 from motionloom.tasks.completion import futures
-from motionloom.weights.predictor import save_predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.papers.benchmark_layouts import HUMANEVA_LAYOUT
 from motionloom_lab.report import report
@@ -295,7 +295,7 @@ def test_bad_input_ends_with_a_sentence(
 
 
 def test_a_built_sets_held_out_clips_are_a_test_part_too(tmp_path: Path) -> None:
-    from motionloom.features import humanml
+    from motionloom.core.features import humanml
     from motionloom_train.data.clips import Clip, write_clip
     from tests.kinematics.people import FPS as SLOW
     from tests.kinematics.people import walking

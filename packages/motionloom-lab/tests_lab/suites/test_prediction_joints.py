@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.weights.predictor import Predictor, save_predictor
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.predictor import Predictor, save_predictor
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom_lab.papers.benchmarks import find_protocol
 from motionloom_lab.suites import prediction_behaviour as behaviour

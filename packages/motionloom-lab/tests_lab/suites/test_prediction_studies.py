@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.weights.container import weights_digest
-from motionloom.weights.predictor import save_predictor
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.predictor import save_predictor
 from motionloom_lab.report import report
 from motionloom_lab.report.report import REAL
 from motionloom_lab.suites import prediction_behaviour as behaviour

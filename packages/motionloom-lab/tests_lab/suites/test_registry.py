@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics.obedience import check
 from motionloom_lab.metrics.realism import NUMBERS, average
 from motionloom_lab.report import results

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.report import report, tables
 from motionloom_lab.report.report import Report
 from motionloom_lab.suites import text, text_reference

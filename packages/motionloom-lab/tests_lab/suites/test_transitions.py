@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.methods.double_take import rows_of
+from motionloom.core.skeleton import SMPL22
 from motionloom_lab.metrics.transitions import JERK_HUMANML3D
-from motionloom_lab.papers.double_take import rows_of
 from motionloom_lab.report import report
 from motionloom_lab.suites import long_baselines, real_seams, text_reference, transitions
 from motionloom_lab.suites.harness import Parts, Run

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.features import humanml
+from motionloom.core.features import humanml
 from motionloom.kinematics import physics as ph
 from motionloom_lab.metrics.obedience import EVERYDAY
 from motionloom_lab.suites import trial

@@ -9,12 +9,12 @@ import pytest
 from safetensors import safe_open
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
-from motionloom.weights.container import read_tensors, split_graphs, weights_digest
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.predictor import Predictor, save_predictor
-from motionloom.weights.prior import Prior, save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import save_tensors
+from motionloom.core.models.container import read_tensors, split_graphs, weights_digest
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.predictor import Predictor, save_predictor
+from motionloom.core.models.prior import Prior, save_prior
 from motionloom_train.convert import convert
 from tests.recorded import tiny
 from tests.recorded.tiny_predictor import predictor

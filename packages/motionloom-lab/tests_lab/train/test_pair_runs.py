@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior, read_tensors, save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior, read_tensors, save_prior
 from motionloom_train.data.pairs import Pair
 from motionloom_train.loop import Training
 from motionloom_train.modules import pair_module

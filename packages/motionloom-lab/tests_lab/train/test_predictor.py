@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.weights.predictor import load_predictor
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.models.predictor import load_predictor
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom_train.data.prediction import Protocol, Recording
 from motionloom_train.loop import Training

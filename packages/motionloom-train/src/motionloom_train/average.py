@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.weights.prior import Prior, save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior, save_prior
 
 
 def averaged(before: Prior, after: Prior, share: float) -> Prior:

@@ -18,13 +18,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import LAYOUT, WIDTH, mask
-from motionloom.features.representation import HUMANML3D
-from motionloom.runtime.text.protocol import TextEncoder
-from motionloom.skeleton import SMPL22
-from motionloom.weights.adapter import Adapter, fingerprint
-from motionloom.weights.prior import Card, Prior, save_prior
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import LAYOUT, WIDTH, mask
+from motionloom.core.features.representation import HUMANML3D
+from motionloom.core.models.adapter import Adapter, fingerprint
+from motionloom.core.models.networks.text.protocol import TextEncoder
+from motionloom.core.models.prior import Card, Prior, save_prior
+from motionloom.core.skeleton import SMPL22
 from motionloom_train.data.batches import FAVOUR, Batches
 from motionloom_train.data.sets import MotionSet, load_set, read_clips
 from motionloom_train.loop import Average, Training

@@ -4,14 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
-from motionloom.runtime.pair import PairConfig
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.runtime.session import check_graph
-from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.minilm import sizes_of, unpacked
-from motionloom.weights.container import (
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import save_tensors
+from motionloom.core.models.container import (
     KINDS,
     PAIRS,
     PREDICTORS,
@@ -21,6 +16,11 @@ from motionloom.weights.container import (
     read_tensors,
     split_graphs,
 )
+from motionloom.core.models.networks.pair import PairConfig
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.networks.session import check_graph
+from motionloom.core.models.networks.sizes import NetConfig
+from motionloom.core.models.networks.text.minilm import sizes_of, unpacked
 from motionloom_train.export import pair_graph, predictor_graph, prior_graphs, text_graph
 
 TEXT = "text."

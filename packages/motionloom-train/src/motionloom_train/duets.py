@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.features import humanml
-from motionloom.features.pair import PlaceCode, along, encode
-from motionloom.ground import compose, from_world, relative, to_world
+from motionloom.core.features import humanml
+from motionloom.core.features.pair import PlaceCode, along, encode
+from motionloom.core.ground import compose, from_world, relative, to_world
 from motionloom_train.data.pairs import Pair, mirrored
 from motionloom_train.nets.pair import other
 

@@ -1,4 +1,4 @@
-"""Networks as ONNX graphs without weights, which `motionloom.runtime` runs with those of the file they lie in.
+"""Networks as ONNX graphs without weights; `motionloom.core.models.networks` runs them with those of their file.
 
 A graph is what a module does, traced: its initialisers have the names that the weights have in a weight file, and hold
 nothing. What depends on the condition alone is left to the runtime, which computes it once; what is in the loop is
@@ -19,12 +19,12 @@ from torch import Tensor, nn
 from torch.onnx import symbolic_helper
 from torch.onnx.utils import register_custom_op_symbolic, unregister_custom_op_symbolic  # type: ignore[attr-defined]
 
-from motionloom.diffusion import SCHEDULES
-from motionloom.runtime.graph import LOCATION
-from motionloom.runtime.pair import PairConfig
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.minilm import HEAD_WIDTH
+from motionloom.core.diffusion import SCHEDULES
+from motionloom.core.models.networks.graph import LOCATION
+from motionloom.core.models.networks.pair import PairConfig
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.networks.sizes import NetConfig
+from motionloom.core.models.networks.text.minilm import HEAD_WIDTH
 from motionloom_train.nets.pair import PairNet, Talk
 from motionloom_train.nets.predictor import TransLinear
 from motionloom_train.nets.prior import Bound, Inner, PriorNet, condition
@@ -55,7 +55,7 @@ class PriorGraph(nn.Module):
         self.net = net
 
     def forward(self, *tensors: Tensor) -> Tensor:
-        """See `motionloom.runtime.prior.PriorSession` for the arguments, which are `inputs` in order."""
+        """See `motionloom.core.models.networks.prior.PriorSession` for the arguments, which are `inputs` in order."""
         return self.net.end(self.net.through(*self.begin(self.net, *tensors)))
 
     @staticmethod
@@ -131,7 +131,7 @@ class PairGraph(nn.Module):
         self.register_buffer("std", std)
 
     def forward(self, *tensors: Tensor) -> tuple[Tensor, Tensor]:
-        """See `motionloom.runtime.pair.PairSession` for the arguments, which are `inputs` in order."""
+        """See `motionloom.core.models.networks.pair.PairSession` for the arguments, which are `inputs` in order."""
         *one, frames, places, signal = tensors
         inner, bound = PriorGraph.begin(self.net, *one)
         inner, place = self.pair[0].spoken(inner, bound, places, signal, frames, frames.shape[1])
@@ -156,7 +156,7 @@ class PredictorGraph(nn.Module):
         self.net = net
 
     def forward(self, state: Tensor, level: Tensor, condition: Tensor, keep: Tensor) -> Tensor:
-        """See `motionloom.runtime.predictor.PredictorSession` for the arguments."""
+        """See `motionloom.core.models.networks.predictor.PredictorSession` for the arguments."""
         return self.net(state, level, condition, keep)
 
     def example(self) -> tuple[Tensor, ...]:
@@ -181,7 +181,7 @@ class TextGraph(nn.Module):
         self.text = net
 
     def forward(self, pieces: Tensor, mask: Tensor) -> Tensor:
-        """See `motionloom.runtime.text` for the arguments."""
+        """See `motionloom.core.models.networks.text` for the arguments."""
         return self.text.layered(pieces, mask[:, None, None, :])
 
     def example(self) -> tuple[Tensor, ...]:

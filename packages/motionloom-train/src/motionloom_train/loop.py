@@ -24,10 +24,10 @@ from torch import Tensor, nn
 from torch.nn.attention import SDPBackend, sdpa_kernel
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
-from motionloom.weights.prior import read_tensors
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import save_tensors
+from motionloom.core.files.text import plain_json
+from motionloom.core.models.prior import read_tensors
 from motionloom_train.captured import Captured
 from motionloom_train.data.progress import Say, silent
 from motionloom_train.objectives import Objective

@@ -1,4 +1,4 @@
-"""Adapters in training: low-rank changes of a frozen network (`motionloom.weights.adapter` has their files).
+"""Adapters in training: low-rank changes of a frozen network (`motionloom.core.models.adapter` has their files).
 
 An `AdaptedNet` is called like the network it comes from; with `Controlled` as its condition it sees what is given.
 """
@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.weights.adapter import CHANGED, GIVEN, READS, Adapter
+from motionloom.core.models.adapter import CHANGED, GIVEN, READS, Adapter
 from motionloom_train.nets.prior import Bound, Condition, NetConfig, PriorNet
 
 SPARSE = 100

@@ -7,14 +7,14 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.runtime.predictor import PredictorSession
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.text.minilm import MiniLM, sizes_of, unpacked
-from motionloom.weights.adapter import NET
-from motionloom.weights.container import check
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Prior
+from motionloom.core.models.adapter import NET
+from motionloom.core.models.container import check
+from motionloom.core.models.networks.predictor import PredictorSession
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.text.minilm import MiniLM, sizes_of, unpacked
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Prior
 from motionloom_train.export import predictor_graph, prior_graphs, text_graph
 from motionloom_train.nets.pair import PairNet, Talk
 from motionloom_train.nets.predictor import TransLinear

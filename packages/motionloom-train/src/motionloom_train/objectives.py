@@ -6,11 +6,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.diffusion import Schedule
-from motionloom.features.humanml import displacements
-from motionloom.features.layout import FEET, LAYOUT
-from motionloom.features.representation import HUMANML3D, Representation
-from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.core.diffusion import Schedule
+from motionloom.core.features.humanml import displacements
+from motionloom.core.features.layout import FEET, LAYOUT
+from motionloom.core.features.representation import HUMANML3D, Representation
+from motionloom.core.models.networks.text.protocol import TextEncoder
 from motionloom_train.data.batches import Batch, Batches
 from motionloom_train.data.progress import Say
 from motionloom_train.low_rank import AdapterNet

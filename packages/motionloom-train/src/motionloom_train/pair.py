@@ -15,13 +15,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.networks.text.known import known_sentences
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.goals.roles import without_two
-from motionloom.runtime.text.known import known_sentences
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from motionloom_train.data.pairs import Pair
 from motionloom_train.duets import Crops, Duets, Sight
 from motionloom_train.export import pair_graph

@@ -15,12 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from motionloom.diffusion import SCHEDULES, Dct, Frames
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import Place
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.weights.predictor import Predictor, condition_shape, find_predictor, load_predictor, save_predictor
-from motionloom.weights.prior import Card
+from motionloom.core.diffusion import SCHEDULES, Dct, Frames
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import Place
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.predictor import Predictor, condition_shape, find_predictor, load_predictor, save_predictor
+from motionloom.core.models.prior import Card
 from motionloom_train.data.prediction import Protocol, Recording
 from motionloom_train.loop import Average, Training, compiled
 from motionloom_train.modules import predictor_module, predictor_session

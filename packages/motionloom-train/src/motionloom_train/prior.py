@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.diffusion import SCHEDULES
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import BABEL, HUMANML3D
-from motionloom.runtime.text.known import Known, known_sentences
-from motionloom.runtime.text.protocol import TextEncoder
-from motionloom.weights.container import read_tensors
-from motionloom.weights.prior import (
+from motionloom.core.diffusion import SCHEDULES
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import BABEL, HUMANML3D
+from motionloom.core.models.container import read_tensors
+from motionloom.core.models.networks.text.known import Known, known_sentences
+from motionloom.core.models.networks.text.protocol import TextEncoder
+from motionloom.core.models.prior import (
     Card,
     Prior,
     find_weights,

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_origin, get_type_hints
 
-from motionloom.diffusion import SCHEDULES
-from motionloom.errors import MotionloomError
-from motionloom.io.text import read_utf8
+from motionloom.core.diffusion import SCHEDULES
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import read_utf8
 from motionloom_train.nets.prior import NetConfig
 from motionloom_train.precision import CHOICES
 

@@ -15,15 +15,15 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.arrays import unit
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.core.arrays import unit
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.core.models.adapter import TAUGHT, Adapter, origin
+from motionloom.core.models.networks.text.known import bare
+from motionloom.core.models.prior import Prior
 from motionloom.requests.fields import declare, like
 from motionloom.requests.teach import Teach
-from motionloom.runtime.text.known import bare
 from motionloom.tasks.text import sample_features
-from motionloom.weights.adapter import TAUGHT, Adapter, origin
-from motionloom.weights.prior import Prior
 from motionloom_train.data.examples import Example
 from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.words import LABELS, imperative

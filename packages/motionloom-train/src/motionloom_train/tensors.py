@@ -4,10 +4,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom import runtime
-from motionloom.diffusion import Schedule
-from motionloom.errors import MotionloomError
-from motionloom.runtime import prior_condition
+from motionloom.core.diffusion import Schedule
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models import networks
+from motionloom.core.models.networks import prior_condition
 from motionloom_train.nets.prior import Condition
 
 
@@ -48,4 +48,4 @@ def find_device(name: str) -> torch.device:
 def set_threads(count: int) -> None:
     """Modules from now on, and sessions that are opened from now on, compute with so many threads."""
     torch.set_num_threads(count)
-    runtime.set_threads(count)
+    networks.set_threads(count)

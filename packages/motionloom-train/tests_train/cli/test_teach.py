@@ -9,11 +9,11 @@ import pytest
 from motionloom import io
 from motionloom.cli import main, parser
 from motionloom.cli.options import option
-from motionloom.kinematics.ik import motion_from_positions
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.prior import Prior
 from motionloom.requests.fields import specs
 from motionloom.requests.teach import Teach
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior
 from motionloom_train import teach as module
 from tests.cli.said import complaint
 from tests.cli.test_adapters import folder, knowing

@@ -9,7 +9,7 @@ import pytest
 from safetensors.numpy import load_file
 
 from motionloom.cli import main
-from motionloom.weights.prior import load_prior, save_prior
+from motionloom.core.models.prior import load_prior, save_prior
 from tests.recorded import tiny
 from tests_train import runs
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.features import humanml as hml
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.features import humanml as hml
 from motionloom.io import save
-from motionloom.kinematics.ik import motion_from_positions
 from tests.kinematics import people
 
 FPS = 20.0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from motionloom.features import humanml as hml
-from motionloom.features.layout import LAYOUT
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import LAYOUT
 from motionloom.kinematics import physics as ph
 from motionloom_train.data import augment
-from tests.features.people import wander
+from tests.core.features.people import wander
 from tests.kinematics import people
 
 FPS = 20.0

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
 from motionloom_train.data import augment
 from motionloom_train.data import build as building
 from motionloom_train.data.actions import ACTIONS, sentences

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom_train.data.examples import check_clip, check_file
 from tests.kinematics import people
 

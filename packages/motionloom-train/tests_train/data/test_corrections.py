@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_train.data.actions import action_of
 from motionloom_train.data.build import build
 from motionloom_train.data.corrections import OPEN, Corrections, read_corrections

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from motionloom.features import humanml as hml
+from motionloom.core.features import humanml as hml
 from motionloom_train.data.augment import Idle
 from motionloom_train.data.clips import Clip, Note
 from motionloom_train.data.derived import faces_up, held_clips, made_clips, sat_and_risen

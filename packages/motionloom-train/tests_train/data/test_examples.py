@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.motion import Motion
 from motionloom_train.data.examples import LENGTH, MOST_CLIPS, CaptionedClip, find_examples, make_examples
 from tests.kinematics import people
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
 from motionloom_train.cli.data import _reasons
 from motionloom_train.data.build import build
 from motionloom_train.data.sources import Places, Span, Take

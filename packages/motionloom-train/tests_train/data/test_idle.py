@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom_train.data import augment
 from motionloom_train.data.augment import SHORTEST, Idle, extended, find_idle

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_train.data.build import build
 from motionloom_train.data.gate import Compared
 from motionloom_train.data.look import choose, draw_look

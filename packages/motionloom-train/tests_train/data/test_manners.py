@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from motionloom.features import humanml as hml
+from motionloom.core.features import humanml as hml
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.gestures import true_spans
-from motionloom.skeleton import SMPL22
 from motionloom_train.data.augment import loop
 from motionloom_train.data.gait import read_gait
 from motionloom_train.data.manner_measures import measure

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from motionloom.features import humanml as hml
+from motionloom.core.features import humanml as hml
 from motionloom_train.data.actions import ACTIONS
 from motionloom_train.data.batches import SHARE, Pool
 from motionloom_train.data.build import _with_mirror

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.features import humanml as hml
+from motionloom.core.features import humanml as hml
 from motionloom_train.data.person import out_of_floor, uniform_person
 from tests.kinematics import people
 

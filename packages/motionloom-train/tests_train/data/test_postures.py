@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import physics as ph
-from motionloom.skeleton import SMPL22
 from motionloom_train.data.postures import assume, postures
 from tests.kinematics import people
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.skeleton import SMPL22
 from motionloom_train.data.prediction import (
     CMU_TEST,
     CMU_VAL,

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from motionloom.features import humanml as hml
-from motionloom.reading import read_table
+from motionloom.core.features import humanml as hml
+from motionloom.core.reading import read_table
 from motionloom_train.data.actions import ACTIONS
 from motionloom_train.data.batches import Batches, _starts
 from motionloom_train.data.clips import Clip, Note, write_clip

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS, WIDTH
 from motionloom_train.data.batches import ABRUPT, Batches
 from motionloom_train.data.sets import Item, MotionSet
 from motionloom_train.data.starts import may_begin, nearest

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.io.atomic import finished
+from motionloom.core.files.atomic import finished
 from motionloom_train.data import build
 from motionloom_train.data.clips import read_clip
 from tests.kills import programs

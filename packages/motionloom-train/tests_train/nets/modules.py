@@ -1,8 +1,8 @@
 """The tiny networks of `tests.recorded.tiny` as modules, and modules and sessions that only tests need."""
 
-from motionloom.runtime.pair import PairSession
-from motionloom.runtime.text.minilm import HEAD_WIDTH, WORDS, MiniLM, sizes_of, unpacked
-from motionloom.runtime.text.quantise import dequantise
+from motionloom.core.models.networks.pair import PairSession
+from motionloom.core.models.networks.text.minilm import HEAD_WIDTH, WORDS, MiniLM, sizes_of, unpacked
+from motionloom.core.models.networks.text.quantise import dequantise
 from motionloom_train.export import pair_graph
 from motionloom_train.modules import arrays, fill, prior_session
 from motionloom_train.nets.pair import PairNet

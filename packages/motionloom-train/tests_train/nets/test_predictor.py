@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.predictor import PredictorConfig
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.predictor import PredictorConfig
 from motionloom_train.nets.predictor import TransLinear, waves
 
 SMALL = PredictorConfig(channels=6, kept=5, layers=4, width=32, heads=2)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_train.nets.prior import Bound, Condition, NetConfig, PriorNet, condition
 from tests.recorded import tiny
 from tests_train.nets.modules import tiny_net

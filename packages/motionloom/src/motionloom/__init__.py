@@ -39,7 +39,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from motionloom.bulk.batch import batch
     from motionloom.bulk.metadata import read_batch
-    from motionloom.errors import MotionloomError
+    from motionloom.core.errors import MotionloomError
+    from motionloom.core.models.pair import PairBlock
+    from motionloom.core.models.predictor import Predictor, save_predictor
+    from motionloom.core.models.prior import Prior, save_prior
+    from motionloom.core.motion import Motion
+    from motionloom.core.skeleton import SMPL22, Skeleton
     from motionloom.goals.goal import Goal
     from motionloom.goals.hold import FixedJoints, FixedPart
     from motionloom.goals.segment import Segment
@@ -47,10 +52,8 @@ if TYPE_CHECKING:
     from motionloom.kinematics.deeds import Deeds, measure_deeds
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
-    from motionloom.motion import Motion
     from motionloom.requests.sampling import PairSampling, PredictionSampling, Sampling
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
-    from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
     from motionloom.tasks.duet import compose_pair, compose_pair_stream, react
     from motionloom.tasks.edit import Extend, Loop, Redraw, edit
@@ -59,14 +62,11 @@ if TYPE_CHECKING:
     from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
     from motionloom.tasks.worded import generate_worded
-    from motionloom.weights.pair import PairBlock
-    from motionloom.weights.predictor import Predictor, save_predictor
-    from motionloom.weights.prior import Prior, save_prior
 
 _NAMES = {
     "bulk.batch": "batch",
     "bulk.metadata": "read_batch",
-    "errors": "MotionloomError",
+    "core.errors": "MotionloomError",
     "goals.goal": "Goal",
     "goals.hold": "FixedJoints FixedPart",
     "goals.segment": "Segment",
@@ -74,10 +74,10 @@ _NAMES = {
     "kinematics.deeds": "Deeds measure_deeds",
     "live.live": "Live",
     "live.pair": "LivePair",
-    "motion": "Motion",
+    "core.motion": "Motion",
     "requests.sampling": "PairSampling PredictionSampling Sampling",
     "retarget": "from_smpl22 retarget to_smpl22",
-    "skeleton": "SMPL22 Skeleton",
+    "core.skeleton": "SMPL22 Skeleton",
     "tasks.control": "Controlled control",
     "tasks.duet": "compose_pair compose_pair_stream react",
     "tasks.edit": "Extend Loop Redraw edit",
@@ -86,9 +86,9 @@ _NAMES = {
     "tasks.predict": "predict switch",
     "tasks.text": "generate",
     "tasks.worded": "generate_worded",
-    "weights.pair": "PairBlock",
-    "weights.predictor": "Predictor save_predictor",
-    "weights.prior": "Prior save_prior",
+    "core.models.pair": "PairBlock",
+    "core.models.predictor": "Predictor save_predictor",
+    "core.models.prior": "Prior save_prior",
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

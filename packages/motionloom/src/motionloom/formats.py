@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 GROUP = "motionloom.formats"
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.skeleton import SMPL22
+from motionloom.core.skeleton import SMPL22
 from tests.io.in_blender import python_with_bpy
 from tests.server.serving import PATIENCE, Server
 

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io import load
 from motionloom.retarget import retarget
 from motionloom.retarget.named import named_skeleton
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.addon.studio import ROOT, SOURCES, Studio, archive
 from tests.io.in_blender import VARIABLE, python_with_bpy
 from tests.io.rigify import make_rig

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.weights.prior import Prior, save_prior
+from motionloom.core.models.prior import Prior, save_prior
 from tests.recorded import tiny
 from tests.tasks.two_people import block
 

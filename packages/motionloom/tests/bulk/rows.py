@@ -8,8 +8,8 @@ import numpy as np
 
 from motionloom.bulk.maker import Options
 from motionloom.bulk.metadata import read_batch
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 
 WORDS = ("a person walks", "a person turns", "a person jumps and waves")
 

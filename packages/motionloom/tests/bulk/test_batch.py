@@ -28,7 +28,7 @@ from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Options
 from motionloom.bulk.metadata import Result, read_batch
 from motionloom.bulk.shard import Batch, Task
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.bulk.rows import apart, options, positions, rows, write_jobs
 
 ONE, TWO = Where(workers=1), Where(workers=2)

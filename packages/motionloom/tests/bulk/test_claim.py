@@ -18,7 +18,7 @@ from motionloom.bulk.batch import LOCAL, Where, batch
 from motionloom.bulk.claim import STALE, Driver, Share, claim, living, names
 from motionloom.bulk.folder import RECORDS, Store
 from motionloom.bulk.metadata import read_batch
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.bulk.rows import options, rows, write_jobs
 from tests.bulk.test_batch import start
 

@@ -15,7 +15,7 @@ from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Made, Maker
 from motionloom.bulk.metadata import read_batch, write_table
 from motionloom.bulk.row import parse
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.goal_file import read_goal
 from motionloom.tasks.pair import generate_pair
 from tests.bulk.rows import options, write_jobs

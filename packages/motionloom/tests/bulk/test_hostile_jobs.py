@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.bulk.jobs import MAX_COLUMNS, Jobs
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 
 def test_a_table_of_very_many_columns_is_refused_without_comparing_them(tmp_path: Path) -> None:

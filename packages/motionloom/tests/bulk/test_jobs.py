@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionloom.bulk.jobs import LARGEST, Jobs, shard_size
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.bulk.rows import rows, write_jobs
 
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("C",)), min_size=1, max_size=30).filter(str.strip)

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionloom.bulk.measures import MEANING, Filter, find_judge, measure
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 
 VALUES = dict.fromkeys(MEANING, None) | {"skate": 0.1, "jerk": 5.0, "travel": 2.0, "seconds": 4.0, "obeys": True}
 
@@ -108,7 +108,7 @@ def test_a_judge_is_found_by_its_module_and_name() -> None:
     assert find_judge("motionloom.bulk.measures:measure") is measure
 
 
-@pytest.mark.parametrize("name", ["", "absent:judge", "motionloom.errors:absent"])
+@pytest.mark.parametrize("name", ["", "absent:judge", "motionloom.core.errors:absent"])
 def test_a_judge_that_is_not_there_is_reported(name: str) -> None:
     with pytest.raises(MotionloomError, match="judge"):
         find_judge(name)

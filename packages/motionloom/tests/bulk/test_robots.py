@@ -13,7 +13,7 @@ from motionloom.bulk.maker import Options
 from motionloom.bulk.metadata import read_batch
 from motionloom.bulk.row import Sources, parse
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.bulk.rows import options, write_jobs
 from tests.robots import models
 from tests.robots.people import marching

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionloom.bulk.row import Sources, parse
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import save
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 from tests.work import work
 
 COMMON = {"weights": "w", "steps": 24}

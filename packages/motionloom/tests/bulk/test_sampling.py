@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motionloom.core.models.prior import Prior, shipped
 from motionloom.tasks.sampling import Rows
 from motionloom.tasks.text import generate, sample_features
-from motionloom.weights.prior import Prior, shipped
 from tests.recorded import tiny
 
 PROMPTS = (

@@ -22,7 +22,7 @@ from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.metadata import Result, read_batch
 from motionloom.bulk.shard import CAREFUL, FATAL, Batch, Report, Task, make_shard
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.io import load
 from tests.bulk.rows import apart, options, positions, rows, write_jobs
 
@@ -401,9 +401,9 @@ def test_goals_timelines_and_skeletons_are_made_and_measured(ready: Maker, folde
 
 
 def _someone_taller(folder: Path) -> Path:
+    from motionloom.core.motion import Motion
+    from motionloom.core.skeleton import SMPL22
     from motionloom.io import save
-    from motionloom.motion import Motion
-    from motionloom.skeleton import SMPL22
 
     skeleton = replace(SMPL22, offsets=1.2 * SMPL22.offsets)
     return save(Motion(skeleton, 20.0, np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 22, 1))), folder / "rig.npz")

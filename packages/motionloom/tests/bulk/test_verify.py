@@ -15,7 +15,7 @@ from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.metadata import read_batch
 from motionloom.bulk.verify import Verified, verify
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.bulk.rows import options, rows
 from tests.bulk.test_shard import flipped
 

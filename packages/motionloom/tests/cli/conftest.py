@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from motionloom.core.models.prior import save_prior
+from motionloom.core.motion import Motion
 from motionloom.io import stream
-from motionloom.motion import Motion
-from motionloom.weights.prior import save_prior
 from tests.recorded import tiny
 
 

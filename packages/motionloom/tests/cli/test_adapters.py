@@ -9,10 +9,10 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
-from motionloom.features import humanml
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.runtime.text.known import known_sentences
-from motionloom.weights.prior import Prior, save_prior
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.features import humanml
+from motionloom.core.models.networks.text.known import known_sentences
+from motionloom.core.models.prior import Prior, save_prior
 from tests.cli.said import complaint
 from tests.kinematics import people
 from tests.recorded import tiny
@@ -126,7 +126,7 @@ def test_actions_are_listed_with_their_seconds(knowing: str, weights: str, capsy
 
 def test_what_is_unknown_is_remarked_on(knowing: str, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     """The random encoder finds everything near, so what counts as near is set between two sentences."""
-    from motionloom.runtime.text import known
+    from motionloom.core.models.networks.text import known
 
     monkeypatch.setattr(known, "NEAR", 2.0)
     monkeypatch.setattr(known, "SAME", 0.9999)

@@ -11,12 +11,12 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
-from motionloom.io.atomic import finished
+from motionloom.core.files.atomic import finished
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.models.prior import Prior
 from motionloom.io.bvh import read_bvh
-from motionloom.io.bvh_writer import save_bvh
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior
 from tests.bulk.rows import rows, write_jobs
 from tests.cli.said import complaint
 from tests.io.motions import largest_distance

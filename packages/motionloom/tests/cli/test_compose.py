@@ -8,10 +8,10 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22
 from motionloom.tasks import long, reattempts
 from tests.cli.said import complaint
 

@@ -8,9 +8,9 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
-from motionloom.motion import Motion
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22
 from motionloom.tasks import control as task
 from tests.cli.said import complaint
 

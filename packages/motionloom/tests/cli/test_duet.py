@@ -9,10 +9,10 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.core.models.networks.text.known import known_sentences
+from motionloom.core.models.prior import save_prior
 from motionloom.requests.sampling import PairSampling
-from motionloom.runtime.text.known import known_sentences
 from motionloom.tasks import pair
-from motionloom.weights.prior import save_prior
 from tests.io.motions import largest_distance
 from tests.recorded import tiny
 from tests.tasks.two_people import block, walkers
@@ -132,8 +132,9 @@ def test_how_the_words_are_read_is_said(
 def test_words_that_no_pair_was_called_are_remarked_on(
     files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("motionloom.runtime.text.known.SAME", 0.999)  # to the tiny encoder all texts are alike
-    monkeypatch.setattr("motionloom.runtime.text.known.NEAR", 1.1)
+    # to the tiny encoder all texts are alike
+    monkeypatch.setattr("motionloom.core.models.networks.text.known.SAME", 0.999)
+    monkeypatch.setattr("motionloom.core.models.networks.text.known.NEAR", 1.1)
     prior = tiny.prior()
     known = known_sentences(["dance salsa together"], {}, prior.text)
     replace(block(prior), known=known).save(files / "dancers.safetensors", half=False)

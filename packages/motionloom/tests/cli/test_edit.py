@@ -8,8 +8,8 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main, parser
+from motionloom.core.files.bvh_writer import save_bvh
 from motionloom.io.bvh import read_bvh
-from motionloom.io.bvh_writer import save_bvh
 from tests.cli.said import complaint
 from tests.io.motions import largest_distance
 from tests.tasks.test_edit import person

@@ -8,10 +8,10 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY, rotvec_to_quat
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.bvh import read_bvh, save_bvh
-from motionloom.motion import Motion
-from motionloom.rotations import IDENTITY, rotvec_to_quat
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.motions import largest_distance
 from tests.io.test_asf import AMC, ASF
 

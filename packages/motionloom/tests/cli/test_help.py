@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from motionloom.cli import commands, commands_of, help, main, parser
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 TABLE = read_table("motionloom.cli", "help.toml")
 

@@ -7,9 +7,9 @@ import pytest
 
 from motionloom import Prior, io
 from motionloom.cli import main
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.motion import Motion
-from motionloom.weights.predictor import save_predictor
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.motion import Motion
 from tests.cli.predict.clips import tiny_predictor
 from tests.cli.said import complaint
 from tests.tasks.test_edit import person

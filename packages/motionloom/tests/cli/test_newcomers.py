@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
+from motionloom.core.files.bvh_writer import save_bvh
 from motionloom.io import load
-from motionloom.io.bvh_writer import save_bvh
 from tests.cli.said import complaint
 from tests.tasks.test_edit import person
 
@@ -113,7 +113,7 @@ def lying_on_its_side(path: str) -> None:
     """A walk as programs with Z up write it, that says nothing of it."""
     from dataclasses import replace
 
-    from motionloom import rotations as rot
+    from motionloom.core import rotations as rot
 
     walk = person(1.0, 30.0)
     turn = rot.rotvec_to_quat(np.array([np.pi / 2, 0, 0]))

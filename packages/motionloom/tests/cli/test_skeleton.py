@@ -10,15 +10,15 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main, skeletons
-from motionloom.ground import turned
-from motionloom.io.bvh_writer import save_bvh
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.ground import turned
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
 from motionloom.io.gltf_read import open_glb
 from motionloom.kinematics.gestures import Seat
-from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.cli.predict.clips import tiny_predictor
 from tests.cli.said import complaint
 from tests.io.gltf_skin import Scene
@@ -133,7 +133,7 @@ def test_commands_that_draw_write_the_character(weights: str, words: tuple[str, 
 
 
 def test_predictions_are_put_on_the_character(tmp_path: Path) -> None:
-    from motionloom.weights.predictor import save_predictor
+    from motionloom.core.models.predictor import save_predictor
 
     weights = str(save_predictor(tiny_predictor(), tmp_path / "tiny.safetensors"))
     more = ["--weights", weights, "--steps", "2", "--skeleton", "hero.glb", "--clip-name", "ours", "--count", "2"]

@@ -13,9 +13,9 @@ import pytest
 
 from motionloom.cli import main, parser
 from motionloom.cli.terminal import escaping, unescaped
-from motionloom.errors import one_line, printable
-from motionloom.runtime.text.known import known_sentences
-from motionloom.weights.prior import save_prior
+from motionloom.core.errors import one_line, printable
+from motionloom.core.models.networks.text.known import known_sentences
+from motionloom.core.models.prior import save_prior
 from tests.recorded import tiny
 
 HOSTILE = "a man\x1b[31m\x1b]0;title\x07 \x9b2J walks\u202e\x7f\r back"
@@ -70,7 +70,7 @@ def test_no_command_passes_on_what_steers_a_terminal(
         print(HOSTILE)
         raise OSError(2, HOSTILE, HOSTILE)
 
-    monkeypatch.setattr("motionloom.weights.prior.Prior.load", refuse)
+    monkeypatch.setattr("motionloom.core.models.prior.Prior.load", refuse)
     for words in lines(command, HOSTILE):
         with contextlib.suppress(SystemExit):
             main(words)
@@ -82,8 +82,8 @@ def test_a_remark_on_an_unknown_prompt_is_escaped(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the weights themselves hold such a sentence."""
-    monkeypatch.setattr("motionloom.runtime.text.known.SAME", 2.0)
-    monkeypatch.setattr("motionloom.runtime.text.known.NEAR", 2.0)
+    monkeypatch.setattr("motionloom.core.models.networks.text.known.SAME", 2.0)
+    monkeypatch.setattr("motionloom.core.models.networks.text.known.NEAR", 2.0)
     prior = tiny.prior()
     known = known_sentences(["a person walks", HOSTILE], {"walk": 9.0}, prior.text)
     place = save_prior(replace(prior, known=known), tmp_path / "a.safetensors")

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import main
-from motionloom.weights.predictor import save_predictor
-from motionloom.weights.prior import save_prior
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.models.prior import save_prior
 from tests.recorded import tiny, tiny_predictor
 from tests.tasks.two_people import block
 

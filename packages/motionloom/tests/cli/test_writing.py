@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import main
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.models.prior import save_prior
 from motionloom.io.bvh import read_bvh
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.weights.predictor import save_predictor
-from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import tiny_predictor
 from tests.cli.said import complaint
 from tests.recorded import tiny

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.features.layout import mask
+from motionloom.core.features.layout import mask
 from tests.conformance.runner import Case, cases
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.diffusion import DDPM, Schedule, cosine, linear, masked_noise
+from motionloom.core.diffusion import DDPM, Schedule, cosine, linear, masked_noise
 from tests.conformance.runner import KNOWN, MASK, MOTION, NOISE, Case, cases, compare, normal, stream
 
 SCHEDULES = {"cosine": cosine, "linear": linear}

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.skeleton import SMPL22
 from tests.conformance.runner import MOTION, Case, cases, compare, normal, stream
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PairMotion
 from motionloom.edits.apart import kept_apart, shift_apart
 from motionloom.edits.meeting import Bodies
-from motionloom.features import pair as two
-from motionloom.features.pair import PairMotion
 from motionloom.io import load
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, gaps
 from motionloom.retarget import to_smpl22

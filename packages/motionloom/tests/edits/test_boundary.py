@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from motionloom import rotations as rot
-from motionloom.blending import cubic_decay, quintic_decay
+from motionloom.core import rotations as rot
+from motionloom.core.blending import cubic_decay, quintic_decay
 from motionloom.edits.boundary import match_boundary, match_rotations
 
 LACK, SLOPE = np.array([0.3, -1.0, 0.0]), np.array([0.02, 0.1, -0.5])

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits import fitting
 from motionloom.edits.fitting import ROUND, fit
-from motionloom.errors import MotionloomError
 from motionloom.goals.goal import Goal
-from motionloom.ground import GroundPose
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 
 WRIST = SMPL22.index("right_wrist")
 RNG = np.random.default_rng(0)

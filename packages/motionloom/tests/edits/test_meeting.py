@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.ground import GroundPose, relative
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits.meeting import Meeting, arms_out, met
-from motionloom.features import pair as two
-from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import LEFT, RIGHT, read_contact
-from motionloom.ground import GroundPose, relative
 from motionloom.kinematics.capsules import overlap
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 
 HALVES = np.array([0.5, 0.5])
 

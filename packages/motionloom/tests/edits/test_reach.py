@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits.steering import lowered, out_of_reach, room_above
 from motionloom.goals.goal import Goal
-from motionloom.skeleton import SMPL22
 
 WRIST, SHOULDER, FRAMES = SMPL22.index("right_wrist"), SMPL22.index("right_shoulder"), 40
 

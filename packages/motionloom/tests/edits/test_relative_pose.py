@@ -6,16 +6,17 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PUBLISHED_CODE, PairMotion
+from motionloom.core.ground import relative
+from motionloom.core.methods.com_mdm import pair_noise
+from motionloom.core.models.networks.pair import PairSession, join
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.edits import relative_pose as duet_places
 from motionloom.edits.relative_pose import Places, relative_pose_guidance
-from motionloom.features import pair as two
-from motionloom.features.pair import PUBLISHED_CODE, PairMotion
-from motionloom.ground import relative
-from motionloom.runtime.pair import PairSession, join
-from motionloom.tasks.pair import PairEdits, generate_pair, pair_features, pair_noise
+from motionloom.tasks.pair import PairEdits, generate_pair, pair_features
 from motionloom.tasks.people import known_state
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
 from tests.tasks.two_people import block as block_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.arrays import true_spans
+from motionloom.core.arrays import true_spans
 from motionloom.edits.stances import FAR, carried, stilled
 
 RNG = np.random.default_rng(0)

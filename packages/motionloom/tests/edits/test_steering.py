@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from motionloom.core.features import humanml
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.prior import Prior
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits.steering import Correction, corrected, toward
-from motionloom.features import humanml
 from motionloom.goals.goal import Goal
-from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
-from motionloom.skeleton import SMPL22
-from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
 

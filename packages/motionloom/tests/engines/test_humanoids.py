@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import joint_map, retarget
 from motionloom.retarget.named import named_skeleton
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.test_blender import waver
 
 # From the hips up, and the limbs of one side with what they hang on; "@" is the side.

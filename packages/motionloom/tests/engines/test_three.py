@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motionloom.core.motion import Motion
 from motionloom.io import save
 from motionloom.io.character import load_character
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from tests.io.rigged import Hero, wave
 from tests.io.test_blender import waver

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.fuzz.container_mutations import prepare
 from tests.fuzz.mutations import mutated
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from motionloom import io
-from motionloom.errors import MotionloomError
-from motionloom.io.text import parse_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json
 from tests.fuzz.reader import reader
 from tests.fuzz.readers_of_motions import motion
 
@@ -61,7 +61,7 @@ def batch(kind: str) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         from motionloom.bulk.batch import Where, batch
         from motionloom.bulk.maker import Options
-        from motionloom.weights.prior import save_prior
+        from motionloom.core.models.prior import save_prior
         from tests.recorded import tiny
 
         weights = save_prior(tiny.prior(), folder / "tiny.safetensors")
@@ -123,7 +123,7 @@ MESSAGES: list[dict[str, Any]] = [
 
 
 def project(folder: Path) -> None:
-    from motionloom.io.npz_writer import save_npz
+    from motionloom.core.files.npz_writer import save_npz
 
     (folder / "motions").mkdir()
     (folder / "characters").mkdir()

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.character import load_character
 from motionloom.io.glb import read_document
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_read import load_glb_people
-from motionloom.motion import Motion
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
 from tests.fuzz.plain_mutations import LARGEST
 from tests.fuzz.reader import reader
 from tests.io.rigged import Hero, wave

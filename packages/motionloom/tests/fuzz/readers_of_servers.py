@@ -16,8 +16,8 @@ from typing import Any
 
 from PIL import Image
 
-from motionloom.errors import MotionloomError, one_line
-from motionloom.io.npz_writer import save_npz
+from motionloom.core.errors import MotionloomError, one_line
+from motionloom.core.files.npz_writer import save_npz
 from tests.fuzz.reader import reader
 from tests.fuzz.readers_of_jobs import CONTROL, EDIT, NAME, REQUEST, TIMELINE, project
 from tests.fuzz.readers_of_motions import motion
@@ -60,7 +60,7 @@ CALLS: list[tuple[str, dict[str, Any]]] = [
 @cache
 def models() -> Any:
     """The prior, loaded once before any process is forked; one thread, since a fork has no others."""
-    from motionloom.runtime import set_threads
+    from motionloom.core.models.networks import set_threads
     from motionloom.tasks.run import Models
     from tests.recorded import tiny
 

@@ -17,13 +17,13 @@ def tiny_prior() -> Any:
 
 
 def prior(folder: Path) -> None:
-    from motionloom.weights.prior import save_prior
+    from motionloom.core.models.prior import save_prior
 
     save_prior(tiny_prior(), folder / "a.safetensors")
 
 
 def read_prior(folder: Path) -> object:
-    from motionloom.weights.prior import Prior
+    from motionloom.core.models.prior import Prior
 
     made = Prior.load(folder / "a.safetensors")
     return made.text.encode(["a person walks"])
@@ -36,7 +36,7 @@ def adapter(folder: Path) -> None:
 
 
 def read_adapter(folder: Path) -> object:
-    from motionloom.weights.adapter import Adapter
+    from motionloom.core.models.adapter import Adapter
 
     return Adapter.load(folder / "a.safetensors", tiny_prior())
 
@@ -48,20 +48,20 @@ def block(folder: Path) -> None:
 
 
 def read_block(folder: Path) -> object:
-    from motionloom.weights.pair import PairBlock
+    from motionloom.core.models.pair import PairBlock
 
     return PairBlock.load(folder / "a.safetensors", tiny_prior())
 
 
 def predictor(folder: Path) -> None:
-    from motionloom.weights.predictor import save_predictor
+    from motionloom.core.models.predictor import save_predictor
     from tests.recorded import tiny_predictor
 
     save_predictor(tiny_predictor.predictor(), folder / "a.safetensors")
 
 
 def read_predictor(folder: Path) -> object:
-    from motionloom.weights.predictor import load_predictor
+    from motionloom.core.models.predictor import load_predictor
 
     return load_predictor(folder / "a.safetensors")
 

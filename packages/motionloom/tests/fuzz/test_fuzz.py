@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.fuzz import machine, readers
 from tests.fuzz.machine import fuzz
 from tests.fuzz.mutations import mutated

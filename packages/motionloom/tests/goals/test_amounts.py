@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.amounts import goal_for, is_met, measured, read_amount, read_seconds, seconds_for
 from motionloom.goals.seconds import natural_seconds
 from motionloom.goals.timeline import timeline_of

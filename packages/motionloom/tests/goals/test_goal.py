@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import ground_pose
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import (
     Goal,
     joined,
@@ -16,9 +19,6 @@ from motionloom.goals.goal import (
     start_of,
     turn_between,
 )
-from motionloom.ground import GroundPose
-from motionloom.motion import ground_pose
-from motionloom.skeleton import SMPL22
 
 PLACES = st.builds(GroundPose, *[st.floats(-50, 50)] * 2, st.floats(-7, 7))
 

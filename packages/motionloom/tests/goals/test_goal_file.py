@@ -10,15 +10,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.goal_file import follow, read_goal
 from motionloom.goals.schemas import goal_schema
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import SMPL22
 from tests.schema_check import fits
 
 EXAMPLES = sorted((Path(__file__).parents[4] / "examples" / "goals").glob("*.json"))

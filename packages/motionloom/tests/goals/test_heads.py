@@ -2,9 +2,9 @@
 
 import pytest
 
+from motionloom.core.models.prior import Prior
 from motionloom.goals.heads import HeadMove, head_said
 from motionloom.goals.remarks import remarks_on
-from motionloom.weights.prior import Prior
 
 AROUND = HeadMove("looks around", 55.0, 0.0)
 

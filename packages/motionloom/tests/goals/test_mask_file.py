@@ -8,13 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.hold import FixedPart
 from motionloom.goals.mask_file import check_names, fixes_everything, read_mask
 from motionloom.goals.schemas import MASK_JOINTS as JOINTS
 from motionloom.goals.schemas import mask_schema
 from motionloom.requests.mask import MASK, PART
-from motionloom.skeleton import SMPL22
 from tests.schema_check import valid
 
 EXAMPLES = sorted((Path(__file__).parents[4] / "examples" / "masks").glob("*.json"))

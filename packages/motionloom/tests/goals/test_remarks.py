@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from motionloom.core.models.networks.text.known import NEAR, Nearest
+from motionloom.core.models.prior import Prior
 from motionloom.goals.remarks import LINE, nearest_known, remarks_on, verb_words
-from motionloom.runtime.text.known import NEAR, Nearest
-from motionloom.weights.prior import Prior
 
 PHRASES = tomllib.loads((Path(__file__).parents[4] / "benchmarks" / "unknown.toml").read_text(encoding="utf-8"))
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.roles import prompts_of, without_two
 
 

@@ -11,17 +11,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.remarks import parts_read
 from motionloom.goals.schemas import timeline_schema
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import plain_timeline, read_timeline, timeline_from, timeline_of
 from motionloom.io import lined_yaml
-from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.timeline import SegmentKeys, TimelineKeys
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
 from tests.schema_check import valid
 from tests.work import work
 

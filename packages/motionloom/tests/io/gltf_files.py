@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 
 
 def random_motion(seed: int, *, joints: int = 6, frames: int = 7, fps: float = 30.0, moving: bool = False) -> Motion:

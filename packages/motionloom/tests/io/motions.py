@@ -3,9 +3,9 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from motionloom.motion import Motion
-from motionloom.rotations import normalize
-from motionloom.skeleton import Skeleton
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import normalize
+from motionloom.core.skeleton import Skeleton
 
 NAME = (
     st.text(st.sampled_from("abcXYZ019 :._-é"), min_size=1, max_size=8).map(lambda s: " ".join(s.split())).filter(bool)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.skeleton import SMPL22
 
 
 class Hero:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
-from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget, to_smpl22
 from motionloom.retarget.axes import CHILD
 from tests.io.gltf_skin import Scene

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.io.asf import find_asf, load_asf_amc, load_skeleton
 from tests.io.motions import turns
 from tests.shared import shared

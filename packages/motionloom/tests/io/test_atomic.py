@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path, check_place
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path, check_place
 
 
 def test_the_file_appears_when_the_block_ends_and_not_before(tmp_path):

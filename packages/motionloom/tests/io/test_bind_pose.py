@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.skeleton import SMPL22
 from tests.io.gltf_skin import Scene
 from tests.io.rigged import Hero, wave
 

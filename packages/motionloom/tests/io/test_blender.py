@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import save
 from motionloom.io.character import load_character
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from motionloom.retarget.named import NAMED, named_skeleton
-from motionloom.skeleton import SMPL22
 from tests.io.in_blender import VARIABLE, Job, Shown, apart, python_with_bpy, shown
 from tests.io.rigged import Hero, wave
 from tests.shared import shared

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.body import body
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 from motionloom.viz.figure import figure
 from tests.io.gltf_files import person
 

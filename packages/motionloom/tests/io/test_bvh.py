@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.bvh import frame_rate, guess_unit, load_bvh, read_bvh, save_bvh
-from motionloom.motion import Motion
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.motions import largest_distance, motions, turns
 from tests.shared import shared
 from tests.work import work
@@ -149,7 +149,7 @@ def test_a_long_file_is_read_in_pieces_that_need_not_end_with_a_row(tmp_path, mo
     )
     path = save_bvh(turning, tmp_path / "long.bvh")
     whole = load_bvh(path, unit=1)
-    monkeypatch.setattr("motionloom.io.text._CHUNK", 50_000)
+    monkeypatch.setattr("motionloom.core.files.text._CHUNK", 50_000)
     tracemalloc.start()
     pieces = load_bvh(path, unit=1)
     _, peak = tracemalloc.get_traced_memory()
@@ -390,7 +390,7 @@ def test_a_long_block_read_in_pieces_is_the_same_and_faults_keep_their_lines(tmp
     rows = [f"{i} {i / 7:.6f} -{i}e-2 0 0 0 0 0 {i % 360}" for i in range(500)]
     text = ARM.partition("0 0 0 0 0 0 0 0 0")[0].replace("Frames: 2", "Frames: 500")
     whole = load_bvh(write(tmp_path, text + "\n".join(rows)), unit=1)
-    monkeypatch.setattr("motionloom.io.text._CHUNK", 100)
+    monkeypatch.setattr("motionloom.core.files.text._CHUNK", 100)
     pieces = load_bvh(write(tmp_path, text + "\n".join(rows)), unit=1)
     np.testing.assert_array_equal(pieces.root[:, 0], np.arange(500))
     np.testing.assert_array_equal(pieces.rotations, whole.rotations)

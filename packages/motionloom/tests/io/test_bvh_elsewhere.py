@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.files.bvh_writer import is_tip, tip
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.bvh import load_bvh, save_bvh
-from motionloom.io.bvh_writer import is_tip, tip
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.rigged import wave
 
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
 from motionloom.io.gltf_mesh import read_surfaces
-from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget
-from motionloom.skeleton import SMPL22
 from tests.io.gltf_skin import Scene
 from tests.io.rigged import Hero, wave
 from tests.io.round_trip import errors, onto

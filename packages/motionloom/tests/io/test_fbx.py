@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import blender, load, open_character, save
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.skeleton import SMPL22
 from tests.cli.said import complaint
 from tests.io.rigged import Hero, wave
 

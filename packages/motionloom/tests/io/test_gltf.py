@@ -12,10 +12,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.gltf import load_glb, save_glb
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 from tests.io.gltf_files import person, random_motion
 from tests.work import work
 

@@ -11,11 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
-from motionloom.io.text import read_bytes
-from motionloom.motion import Motion
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import read_bytes
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22
 from tests.io.test_asf import AMC, ASF
 from tests.io.test_bvh import ARM
 from tests.work import work

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.info import describe, family
-from motionloom.motion import Motion
 from motionloom.retarget.named import named_skeleton
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.retarget.test_transfer import stroll
 
 

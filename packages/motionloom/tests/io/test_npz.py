@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given, settings
 
 from motionloom import io
-from motionloom import rotations as rot
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.npz_writer import save_npz
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import IDENTITY
+from motionloom.core.skeleton import SMPL22, Poses
 from motionloom.io.character import load_character
 from motionloom.io.npz import load_npz, read_array
-from motionloom.io.npz_writer import save_npz
-from motionloom.motion import Motion
 from motionloom.retarget import retarget, to_smpl22
 from motionloom.retarget.upright import AXES
-from motionloom.rotations import IDENTITY
-from motionloom.skeleton import SMPL22, Poses
 from tests.io.motions import motions
 from tests.io.rigged import Hero
 
@@ -101,7 +101,7 @@ def test_numpy_reads_the_documented_arrays_without_pickle(tmp_path):
 
 
 def test_plain_positions_are_read_where_they_say_their_rate(tmp_path):
-    pytest.importorskip("motionloom.kinematics.ik")
+    pytest.importorskip("motionloom.core.body.ik")
     motion = still(8)
     np.savez(tmp_path / "a.npz", positions=motion.positions(), fps=20)
     again = io.load(tmp_path / "a.npz")

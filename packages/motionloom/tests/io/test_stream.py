@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.errors import MotionloomError
-from motionloom.io import bvh_writer
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import bvh_writer
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import normalize, rotvec_to_quat
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import stream as streams
 from motionloom.io.stream import joined, open_stream, resampled
-from motionloom.motion import Motion
-from motionloom.rotations import normalize, rotvec_to_quat
-from motionloom.skeleton import SMPL22
 from tests.io.motions import largest_distance
 
 

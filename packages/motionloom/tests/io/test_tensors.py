@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import MAX_HEAD, MAX_TENSORS, check_head, save_tensors
-from motionloom.weights.container import PRIORS, read_tensors
-from motionloom.weights.prior import read_card
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import MAX_HEAD, MAX_TENSORS, check_head, save_tensors
+from motionloom.core.models.container import PRIORS, read_tensors
+from motionloom.core.models.prior import read_card
 from tests.work import work
 
 

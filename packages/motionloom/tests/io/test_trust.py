@@ -11,18 +11,19 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.errors import LONGEST_MESSAGE, MotionloomError
+from motionloom.core.errors import LONGEST_MESSAGE, MotionloomError
+from motionloom.core.files import text
+from motionloom.core.files.atomic import atomic_path, finished
+from motionloom.core.files.tensors import save_tensors
+from motionloom.core.skeleton import Skeleton
 from motionloom.goals.drawing import read_drawing
 from motionloom.goals.goal_file import read_goal
-from motionloom.io import npz, text
-from motionloom.io.atomic import atomic_path, finished
+from motionloom.io import npz
 from motionloom.io.folder import atomic_folder
-from motionloom.io.tensors import save_tensors
-from motionloom.skeleton import Skeleton
 
 HOLDS = """
 import sys, time
-from motionloom.io.atomic import atomic_path
+from motionloom.core.files.atomic import atomic_path
 with atomic_path(sys.argv[1]) as part:
     part.write_bytes(b"half")
     print("holds", flush=True)
@@ -56,7 +57,8 @@ def test_a_part_is_no_finished_file_and_is_swept_when_its_writer_is_gone(tmp_pat
 
 def sweeps(folder: Path) -> None:
     """Another process that writes into the folder for the first time."""
-    program = "import sys\nfrom motionloom.io.atomic import atomic_path\nwith atomic_path(sys.argv[1]) as p: pass"
+    imports = "import sys\nfrom motionloom.core.files.atomic import atomic_path\n"
+    program = f"{imports}with atomic_path(sys.argv[1]) as p: pass"
     subprocess.run([sys.executable, "-c", program, str(folder / "b")], check=True)
 
 

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io import load, save, save_scene
 from motionloom.io.character import load_character
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.usda import joint_paths, save_usda
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.gltf_skin import Scene
 from tests.io.rigged import Hero, wave
 from tests.shared import shared

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.character import load_character
-from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget, to_smpl22
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.gltf_skin import Scene
 from tests.io.rigged import wave
 from tests.shared import shared

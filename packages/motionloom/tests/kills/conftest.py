@@ -2,7 +2,7 @@
 
 import pytest
 
-from motionloom.weights.prior import save_prior
+from motionloom.core.models.prior import save_prior
 from tests.recorded import tiny
 
 

@@ -21,7 +21,7 @@ from types import FrameType
 
 import pytest
 
-from motionloom.interruption import interruptible
+from motionloom.core.interruption import interruptible
 
 needs_signals = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs forks and signals")
 SEED = 7

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from motionloom import io
-from motionloom.io.atomic import finished
-from motionloom.weights.predictor import save_predictor
-from motionloom.weights.prior import save_prior
+from motionloom.core.files.atomic import finished
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.models.prior import save_prior
 from tests.cli.predict.clips import tiny_predictor
 from tests.kills.programs import (
     SEED,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.io.atomic import finished
+from motionloom.core.files.atomic import finished
 from tests.kills.programs import (
     SEED,
     SIGNALS,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics.physics import J
-from motionloom.skeleton import SMPL22
 
 FPS = 20.0
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics.capsules import DEEP, RADII, overlap, overlaps, trunk_distance
-from motionloom.skeleton import SMPL22
 
 
 def standing(x: float) -> np.ndarray:

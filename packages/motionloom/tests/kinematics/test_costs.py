@@ -2,8 +2,8 @@
 
 import pytest
 
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import costs
-from motionloom.skeleton import SMPL22
 
 TABLES = (costs.BALL_TURN, costs.HINGE_TURN, costs.BONE_SWING, costs.SLACK, costs.REACH, costs.BASE)
 

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.kinematics.deeds import RATE, deeds_at, measure_deeds
 from motionloom.kinematics.physics import ANKLES, TOES, J
-from motionloom.motion import Motion
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.kinematics.people import circling, jumping, moved, spun, standing, walking
 from tests.kinematics.test_counts import waves
 

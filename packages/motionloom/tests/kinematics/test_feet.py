@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FEET, LAYOUT
-from motionloom.kinematics.feet import clean_feet, planted_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
-from tests.features.clips import real
-from tests.features.people import wander
+from motionloom.core import rotations as rot
+from motionloom.core.body.feet import clean_feet, planted_feet
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FEET, LAYOUT
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
+from tests.core.features.clips import real
+from tests.core.features.people import wander
 
 FPS = 20.0
 

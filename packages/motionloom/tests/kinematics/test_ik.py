@@ -5,14 +5,14 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.kinematics import ik
-from motionloom.kinematics.ik import LIMBS, motion_from_positions
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
-from tests.features.clips import real
-from tests.features.people import wander
+from motionloom.core import rotations as rot
+from motionloom.core.body import ik
+from motionloom.core.body.ik import LIMBS, motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
+from tests.core.features.clips import real
+from tests.core.features.people import wander
 
 FPS = 20.0
 SEEDS = st.integers(0, 10_000)

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import load
 from motionloom.kinematics.physics import J
 from motionloom.kinematics.wholeness import ENOUGH, angles, broken_frames, shoulders_below, whole_frames, wholeness
 from motionloom.retarget import joints22, to_smpl22
-from motionloom.skeleton import SMPL22
 from tests.kinematics import people
 from tests.shared import shared
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from motionloom.features import humanml
+from motionloom.core.features import humanml
+from motionloom.core.models.prior import Prior
 from motionloom.live.settings import Settings
-from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 from tests.tasks.test_edit import person
 

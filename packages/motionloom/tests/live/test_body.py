@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from motionloom.features.layout import FEET
-from motionloom.kinematics.feet import clean_feet, planted_feet
+from motionloom.core.body.feet import clean_feet, planted_feet
+from motionloom.core.features.layout import FEET
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.live.body import transfer
 from motionloom.retarget.transfer import joints22, move_feet
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.kinematics.test_feet import slider
 
 FPS, PAST = 20, 10

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.live.commands import Command, FrameCommand, Path, Pose, Reach, Say, Steer
 from motionloom.live.live import Frame, Live, motion_of
 from motionloom.live.person import stays
 from motionloom.live.settings import Settings
-from motionloom.motion import Motion
-from motionloom.weights.prior import Prior
 from tests.live import people
 from tests.live.people import QUICK
 from tests.tasks.test_edit import person

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.live.commands import Say, Steer
 from motionloom.live.live import Live, motion_of
 from motionloom.live.pair import LivePair
 from motionloom.live.settings import Settings
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from tests.live import people
 from tests.live.people import QUICK
 from tests.tasks.two_people import block

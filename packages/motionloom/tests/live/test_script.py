@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.live.commands import Path as Way
 from motionloom.live.commands import Reach, Say, Steer, to_json
 from motionloom.live.live import Live

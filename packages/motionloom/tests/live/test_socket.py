@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.live import clock, messages, socket
 from motionloom.live.commands import LONGEST_TEXT, Path, Pose, Reach, Say, Steer, from_json, person_of, to_json
 from motionloom.live.sessions import Sessions
 from motionloom.live.socket import live_session
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.live import people
 from tests.live.people import QUICK
 from tests.tasks.two_people import block

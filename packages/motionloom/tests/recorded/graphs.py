@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load_file
 
-from motionloom.features.positions import SMPL_LAYOUT, Layout
-from motionloom.runtime.pair import PairConfig
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.runtime.sizes import NetConfig
-from motionloom.weights.predictor import condition_shape
+from motionloom.core.features.positions import SMPL_LAYOUT, Layout
+from motionloom.core.models.networks.pair import PairConfig
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.networks.sizes import NetConfig
+from motionloom.core.models.predictor import condition_shape
 
 FILE = Path(__file__).with_name("graphs.safetensors")
 TEXT = {"width": 64, "hidden": 96, "layers": 2}

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from motionloom.diffusion import cosine
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.shapes import prior_shapes
-from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.minilm import SPECIALS, WORDS, MiniLM, pack, shapes
-from motionloom.weights.adapter import GIVEN, NET, TAUGHT, Adapter, fingerprint, layers
-from motionloom.weights.prior import Card, Prior
+from motionloom.core.diffusion import cosine
+from motionloom.core.models.adapter import GIVEN, NET, TAUGHT, Adapter, fingerprint, layers
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.shapes import prior_shapes
+from motionloom.core.models.networks.sizes import NetConfig
+from motionloom.core.models.networks.text.minilm import SPECIALS, WORDS, MiniLM, pack, shapes
+from motionloom.core.models.prior import Card, Prior
 from tests.recorded.graphs import MODULATED, PUBLISHED, TEXT, graph, random_weights
 
 __all__ = ["MODULATED", "PUBLISHED"]

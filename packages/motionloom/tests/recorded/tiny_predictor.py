@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from motionloom.diffusion import Dct, cosine
-from motionloom.runtime.predictor import PredictorConfig, PredictorSession
-from motionloom.runtime.shapes import predictor_shapes
-from motionloom.weights.adapter import NET
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Card
+from motionloom.core.diffusion import Dct, cosine
+from motionloom.core.models.adapter import NET
+from motionloom.core.models.networks.predictor import PredictorConfig, PredictorSession
+from motionloom.core.models.networks.shapes import predictor_shapes
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Card
 from tests.recorded.graphs import BARE, BODY, bare, graph, masked, random_weights
 
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import motionloom
-from motionloom import diffusion
-from motionloom.errors import MotionloomError
+from motionloom.core import diffusion
+from motionloom.core.errors import MotionloomError
 from motionloom.requests import sampling
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import read

@@ -2,7 +2,7 @@
 
 import pytest
 
-from motionloom.diffusion import cosine
+from motionloom.core.diffusion import cosine
 from motionloom.requests.sampling import GUIDANCE, LATE_GUIDANCE, PairSampling, PredictionSampling, Sampling
 
 SCHEDULE = cosine(1000)

@@ -26,8 +26,10 @@ from motionloom.bulk.batch import batch
 from motionloom.bulk.metadata import read_batch
 from motionloom.cli import main, parser
 from motionloom.cli.options import option
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.models.prior import save_prior
+from motionloom.core.motion import Motion
 from motionloom.requests.batch import Batch, RowKeys
 from motionloom.requests.export import Export
 from motionloom.requests.fields import specs
@@ -41,8 +43,6 @@ from motionloom.tasks.long import compose
 from motionloom.tasks.pair import generate_pair, person_seeds
 from motionloom.tasks.predict import predict, switch
 from motionloom.tasks.text import generate
-from motionloom.weights.predictor import save_predictor
-from motionloom.weights.prior import save_prior
 from tests.bulk.rows import options, write_jobs
 from tests.cli.predict.clips import tiny_predictor
 from tests.recorded import tiny

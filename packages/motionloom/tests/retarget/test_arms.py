@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import from_smpl22, joints22, to_smpl22
-from motionloom.skeleton import SMPL22, Skeleton
 
 COLLARS = ("left_collar", "right_collar")
 WRISTS = [20, 21]

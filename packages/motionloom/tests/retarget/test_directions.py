@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.io import load
 from motionloom.kinematics.wholeness import LOWEST_SHOULDERS, shoulders_below
-from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22, joints22, to_smpl22
 from motionloom.retarget.fidelity import compare
 from tests.shared import SHARED, shared

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
 from motionloom.io import load
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.fidelity import compare

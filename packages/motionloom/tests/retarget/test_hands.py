@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
 from motionloom.cli import main
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.bvh import load_bvh
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.motion import Motion
 from motionloom.retarget.hands import POSES, pose_hands
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.io.rigged import wave
 from tests.shared import shared
 

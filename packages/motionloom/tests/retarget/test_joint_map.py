@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import joint_map, joints22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.named import named_skeleton
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.shared import shared
 from tests.work import work
 

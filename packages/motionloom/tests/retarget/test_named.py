@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import joint_map, retarget
 from motionloom.retarget.named import NAMED, named_skeleton
-from motionloom.skeleton import SMPL22, Skeleton
 
 
 @pytest.mark.parametrize("name", NAMED[1:])

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import retarget
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.toes import bend_toes
-from motionloom.skeleton import SMPL22, Skeleton
 
 
 def with_tips() -> Skeleton:

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import from_smpl22, joints22, retarget, to_smpl22
 from motionloom.retarget.axes import CHILD
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.shared import shared
 
 BONES = [(j, c) for j, c in enumerate(CHILD) if c is not None]

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io import load
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.motion import Motion
 from motionloom.requests.export import UPS
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.axes import CHILD
 from motionloom.retarget.upright import AXES
-from motionloom.skeleton import SMPL22, Skeleton
 from tests.shared import shared
 from tests.tasks.test_edit import person
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 
 
 def marching(seconds: float = 1.5, fps: float = 30.0) -> Motion:

@@ -8,8 +8,8 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.core.models.prior import save_prior
 from motionloom.goals.goal_file import read_goal
-from motionloom.weights.prior import save_prior
 from tests.live import people
 from tests.robots import models
 from tests.robots.people import marching

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom import rotations as rot
 from motionloom.cli import main
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.skeleton import SMPL22
 from tests.robots import models
 from tests.robots.people import marching
 

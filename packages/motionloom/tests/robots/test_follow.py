@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.live import messages
 from motionloom.live.sessions import Sessions
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.skeleton import SMPL22
 from tests.live import people
 from tests.live.people import QUICK
 from tests.live.test_socket import Client, talk

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from tests.robots import models
 from tests.robots.people import marching, stepping_aside
 

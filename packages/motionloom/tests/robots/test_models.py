@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from tests.robots import models
 from tests.robots.people import marching
 from tests.shared import shared

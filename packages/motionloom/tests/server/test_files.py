@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from motionloom import load
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import load_scene, save
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
-from motionloom.motion import Motion
 from motionloom.requests.export import ROOTS, Export
 from motionloom.retarget.named import named_skeleton
 from motionloom.server.files import export
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
-from motionloom.skeleton import SMPL22
 from motionloom.viz import page
 from tests.io.rigged import Hero
 from tests.io.test_bind_pose import place

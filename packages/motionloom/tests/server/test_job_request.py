@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 pytest.importorskip("starlette", reason="needs the extra 'studio'")
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.requests.fields import specs
 from motionloom.requests.tasks import REQUESTS
 from motionloom.server.drawing import batch_key

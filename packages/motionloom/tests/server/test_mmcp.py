@@ -11,10 +11,10 @@ pytest.importorskip("fastapi", reason="needs the extra 'mmcp': pip install 'moti
 
 from motionmcp import client
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.skeleton import SMPL22
 from motionloom.retarget.named import named_skeleton
 from motionloom.server.mmcp.rigs import read_rig
-from motionloom.skeleton import SMPL22
 from tests.server.serving import Server
 
 QUICK = {"seed": 1, "diffusion_steps": 6}

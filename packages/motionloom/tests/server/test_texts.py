@@ -11,7 +11,7 @@ pytest.importorskip("starlette", reason="needs the extra 'studio': pip install '
 
 from starlette.responses import JSONResponse
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.live.messages import hello
 from motionloom.live.messages import read as read_message
 from motionloom.server.app import QUERIES

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from motionloom.core.motion import Motion
 from motionloom.io import save
 from motionloom.io.character import load_character
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from motionloom.viz.notebook import framed
 from motionloom.viz.page import MAX_BYTES, Take, write_page

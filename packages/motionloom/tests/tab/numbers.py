@@ -8,22 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.diffusion import generator, guide
-from motionloom.diffusion.sampling import row_seed
+from motionloom.core.diffusion import generator, guide
+from motionloom.core.diffusion.sampling import row_seed
+from motionloom.core.models.networks.text.minilm import MiniLM
+from motionloom.core.models.networks.text.protocol import as_rows
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.amounts import measured
 from motionloom.goals.goal import start_of
 from motionloom.goals.paths import root_path
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import timeline_of
-from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED, Sampling
-from motionloom.runtime.text.minilm import MiniLM
-from motionloom.runtime.text.protocol import as_rows
 from motionloom.tasks.control import steered_features
 from motionloom.tasks.long import Track, compose, long_features, place_pieces
 from motionloom.tasks.supported import add_support
 from motionloom.tasks.text import sample_features, to_motion
-from motionloom.weights.prior import Prior
 
 SENTENCES = (
     "a person walks forward",

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.weights.container import weights_digest
-from motionloom.weights.prior import Prior, find_weights
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.prior import Prior, find_weights
 from tests.tab import made, numbers
 
 pytestmark = pytest.mark.slow

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from motionloom import generate, load
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import start_of
 from motionloom.goals.paths import root_path
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import turn
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import steered_features
 from motionloom.tasks.long import compose, long_features
 from motionloom.tasks.text import sample_features, to_motion
-from motionloom.weights.prior import Prior
 from tests.io.rigged import Hero
 from tests.studio import started
 from tests.tab import made, numbers

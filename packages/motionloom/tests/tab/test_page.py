@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from motionloom import load
+from motionloom.core.models.prior import Prior
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.glb import pack_glb
 from motionloom.kinematics.counts import foot_moves
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.text import sample_features, to_motion
-from motionloom.weights.prior import Prior
 from tests.tab import made
 from tests.tab.tab import Tab
 

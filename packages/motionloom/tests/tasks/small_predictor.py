@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from motionloom.diffusion import Dct, sqrt
-from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Card
+from motionloom.core.diffusion import Dct, sqrt
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Card
 from tests.recorded.graphs import PREDICTORS
 from tests.recorded.tiny_predictor import network
 

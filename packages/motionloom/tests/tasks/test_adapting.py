@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.adapter import Adapter, fingerprint, origin
+from motionloom.core.models.networks.text.known import known_sentences
+from motionloom.core.models.prior import Prior
 from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
 from motionloom.requests.sampling import Sampling
-from motionloom.runtime.text.known import known_sentences
 from motionloom.tasks.adapting import CACHE_SIZE, adapt, adapted_priors
 from motionloom.tasks.long import load_segment_adapters, long_features
 from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.text import sample_features
-from motionloom.weights.adapter import Adapter, fingerprint, origin
-from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 from tests.recorded.tiny import adapter
 
@@ -157,7 +157,7 @@ WALKS, TURNS, JUMPS = "a person walks", "walk un left", "a person jumps"
 @pytest.fixture
 def knowing(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> Prior:
     """A prior that knows how to walk, to whose random encoder every other sentence is something else."""
-    monkeypatch.setattr("motionloom.weights.prior.OWN_WORDS", 0.0)
+    monkeypatch.setattr("motionloom.core.models.prior.OWN_WORDS", 0.0)
     return replace(prior, known=known_sentences([WALKS], {"walk": 9.0}, prior.text))
 
 

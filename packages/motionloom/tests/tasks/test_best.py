@@ -7,14 +7,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from motionloom.diffusion.sampling import row_seed
-from motionloom.errors import MotionloomError
+from motionloom.core.diffusion.sampling import row_seed
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.best import Chooser, best_candidate
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Rows, sample, with_best_seeds
 from motionloom.tasks.text import finish, generate, sample_features
-from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.body.feet import clean_feet
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import Goal
-from motionloom.kinematics.feet import clean_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import body
 from motionloom.tasks.body import Places, solve, solve_stream
 from tests.tasks.test_edit import person

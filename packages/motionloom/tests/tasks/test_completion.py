@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from motionloom.diffusion import row_noise, row_seed
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT, bone_lengths
+from motionloom.core.diffusion import row_noise, row_seed
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import SMPL_LAYOUT, bone_lengths
 from motionloom.tasks.completion import Known, complete, futures, join_known, next_frames
 from tests.noise import normal
 from tests.tasks.small_predictor import FRAMES, OBSERVED, small_predictor

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.prior import Prior
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import Goal
-from motionloom.ground import GroundPose
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import control, evaluate, fitting_adapters, goal_feature_mask
 from motionloom.tasks.text import generate
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 
 WRIST = SMPL22.index("right_wrist")
@@ -110,7 +110,7 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
 ) -> None:
     files = {"trajectory": adapter(prior).save(tmp_path / "trajectory.safetensors")}
     monkeypatch.setattr("motionloom.tasks.control.shipped", lambda: files)
-    monkeypatch.setattr("motionloom.weights.container.Container.shipped", lambda self: files)
+    monkeypatch.setattr("motionloom.core.models.container.Container.shipped", lambda self: files)
     assert [one.name for one in fitting_adapters(prior, path())] == ["blank"]
     with pytest.raises(MotionloomError, match="belongs to the weights"):
         fitting_adapters(tiny.prior(seed=5), path())

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.kinematics.gaze import NOD, TURN, looking, looks
-from motionloom.motion import Motion
 from motionloom.requests.tasks import Edit
 from motionloom.retarget import from_smpl22, joints22
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.direct_edits import Look, Overlay, Smooth
 from motionloom.tasks.edit import changes_from_options, edit
 from motionloom.tasks.run import Models, Plan, run

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
-from motionloom.features.pair import PairMotion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.models.networks.pair import PairSession, join
+from motionloom.core.models.networks.prior_condition import Bound
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
 from motionloom.retarget import to_smpl22
-from motionloom.runtime.pair import PairSession, join
-from motionloom.runtime.prior_condition import Bound
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import duet as tasks
 from motionloom.tasks.duet import compose_pair, compose_pair_stream, duet_features, react
 from motionloom.tasks.splice import person_at_20
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
 from tests.tasks.two_people import block as block_of

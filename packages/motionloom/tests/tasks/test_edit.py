@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import WIDTH
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.prior_condition import Bound
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.edits.boundary import InpaintWindow, arrival, joining
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import WIDTH
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.retarget import from_smpl22
 from motionloom.retarget.onto import match_root
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.prior_condition import Bound
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import Extend, Loop, Redraw, changes_from_options, edit, inpaint_motion, kept_feature_mask
 from motionloom.tasks.splice import ground_pose_at, kept_parts, move_rigidly, person_at_20, splice
-from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
 

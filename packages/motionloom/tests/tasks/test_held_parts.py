@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import turned
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.hold import FixedJoints, FixedPart
-from motionloom.ground import turned
-from motionloom.motion import Motion
 from motionloom.retarget import joints22
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import predict as task
 from motionloom.tasks.completion import Past
 from motionloom.tasks.predict import predict, predict_pieces, prepare_hold

@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.placed import PlacedMotion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
-from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
-from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.long import Past, compose, compose_stream, compose_takes, long_features
 from motionloom.tasks.splice import move_rigidly
 from motionloom.tasks.text import sample_features
 from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import Denoised, watching
-from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 from tests.tasks.test_edit import person
 from tests.tasks.test_text import babel_prior

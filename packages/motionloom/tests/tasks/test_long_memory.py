@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 
-from motionloom.diffusion import cosine
+from motionloom.core.diffusion import cosine
+from motionloom.core.models.networks.prior_condition import Bound, Condition
+from motionloom.core.models.networks.sizes import NetConfig
+from motionloom.core.models.networks.text.protocol import TextEmbedding
+from motionloom.core.models.prior import Card, Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.segment import Segment
-from motionloom.motion import Motion
-from motionloom.runtime.prior_condition import Bound, Condition
-from motionloom.runtime.sizes import NetConfig
-from motionloom.runtime.text.protocol import TextEmbedding
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import body
 from motionloom.tasks.body import Places
 from motionloom.tasks.long import compose_stream
-from motionloom.weights.prior import Card, Prior
 
 SEGMENTS, SECONDS = 720, 5.0
 

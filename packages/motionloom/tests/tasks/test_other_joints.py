@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import SMPL_LAYOUT, Layout
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.io.layout_places import read_places
 from motionloom.kinematics.layout_body import body_of_places, layout_skeleton, places_on_layout
-from motionloom.motion import Motion
 from motionloom.retarget import joints22
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.other_joints import on_joints_of
 from motionloom.tasks.predict import predict, predict_pieces, switch
 from motionloom.tasks.splice import concatenate, person_at
-from motionloom.weights.predictor import Predictor
 from tests.recorded import tiny_predictor
 from tests.tasks.test_edit import person
 

@@ -5,18 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.diffusion import levels
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features import pair as two
-from motionloom.features.humanml import positions_at
-from motionloom.features.pair import PairMotion
+from motionloom.core.diffusion import levels
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features import pair as two
+from motionloom.core.features.humanml import positions_at
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.methods.edit import Observed
+from motionloom.core.models.networks.pair import PairSession
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import Goal
-from motionloom.ground import GroundPose
 from motionloom.kinematics.shared_world import one_world
-from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
-from motionloom.runtime.pair import PairSession
 from motionloom.tasks import pair
 from motionloom.tasks.duet import react
 from motionloom.tasks.pair import (
@@ -27,10 +30,7 @@ from motionloom.tasks.pair import (
     person_seeds,
 )
 from motionloom.tasks.people import PairPast, known_state
-from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import finish, sample_features
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from tests.noise import normal
 from tests.recorded import tiny
 from tests.tasks.test_edit import person as one_person

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.ground import turned
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import turned
+from motionloom.core.motion import Motion
 from motionloom.io import load
-from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task

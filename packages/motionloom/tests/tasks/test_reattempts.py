@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import Timeline
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.requests.tasks import Compose
 from motionloom.tasks import reattempts
@@ -19,7 +20,6 @@ from motionloom.tasks.reattempts import Reattempted, attempt_seed, reattempt
 from motionloom.tasks.redraw import Run, Timed, resample_runs
 from motionloom.tasks.run import Models, Plan, run
 from motionloom.tasks.watching import Denoised, watching
-from motionloom.weights.prior import Prior
 from tests.tasks.test_redraw import STEPS, prior, sampled, straight, timed
 
 __all__ = ["prior"]

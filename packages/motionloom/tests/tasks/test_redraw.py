@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motionloom.features import humanml
-from motionloom.features.layout import FEET
+from motionloom.core.body.feet import planted_feet
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FEET
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
-from motionloom.kinematics.feet import planted_feet
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Block, Run, Timed, blocks_from, changed_runs, resample_runs
 from motionloom.tasks.watching import Denoised, watching
-from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 from tests.tasks.test_edit import person
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from motionloom.diffusion import Denoiser, State
-from motionloom.errors import MotionloomError
+from motionloom.core.diffusion import Denoiser, State
+from motionloom.core.errors import MotionloomError
+from motionloom.core.methods.edit import Observed
 from motionloom.requests.sampling import PairSampling, PredictionSampling, Sampling
-from motionloom.tasks.sampling import Batch, Observed, Rows, sample
+from motionloom.tasks.sampling import Batch, Rows, sample
 from tests.recorded import tiny
 
 

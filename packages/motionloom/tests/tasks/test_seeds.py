@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from motionloom.core.models.prior import Prior
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior
 
 FEW = {"seconds": 2.0, "steps": 6}
 PROMPT = "a person walks forward and waves"

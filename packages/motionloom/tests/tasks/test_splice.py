@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.tasks.splice import KeptParts, splice
 from tests.tasks.test_edit import person
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.expected import climbs, floating
 from motionloom.kinematics.physics import WRISTS, J
 from motionloom.kinematics.stairs import falls_from_above, hovering, in_the_air, stairs
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import run
 from motionloom.tasks.run import Models, Plan, Result
 from motionloom.tasks.supported import add_support, add_support_between, is_elevated, remarks_on_air

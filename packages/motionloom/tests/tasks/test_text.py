@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.features.babel import decode, facing
-from motionloom.motion import Motion
-from motionloom.runtime.text.protocol import TextEmbedding
-from motionloom.runtime.text.published import PublishedText
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.babel import decode, facing
+from motionloom.core.models.networks.text.protocol import TextEmbedding
+from motionloom.core.models.networks.text.published import PublishedText
+from motionloom.core.models.prior import Prior, load_prior, save_prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.tasks.supported import add_support
 from motionloom.tasks.text import finish, generate, sample_features, to_motion
-from motionloom.weights.prior import Prior, load_prior, save_prior
 from tests.noise import normal
 from tests.recorded import tiny
 from tests.recorded.graphs import BABEL

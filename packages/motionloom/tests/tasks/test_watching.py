@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from motionloom import Predictor, Prior, Redraw, Segment, compose, edit, generate, predict
+from motionloom.core.models.pair import PairBlock
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.pair import generate_pair
 from motionloom.tasks.watching import Denoised, watching
-from motionloom.weights.pair import PairBlock
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.diffusion import row_seed
-from motionloom.features.positions import bone_lengths
+from motionloom.core.diffusion import row_seed
+from motionloom.core.features.positions import bone_lengths
+from motionloom.core.skeleton import SMPL22
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import to_smpl22
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import completion
 from motionloom.tasks.completion import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, next_frames, window_count
 from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor

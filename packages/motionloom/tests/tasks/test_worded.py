@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.kinematics.gaze import looks
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks import reattempts, worded
 from motionloom.tasks.text import generate
 from motionloom.tasks.watching import watching
-from motionloom.weights.prior import Prior
 from tests.recorded import tiny
 
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.networks.shapes import pair_shapes
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.io import load
-from motionloom.motion import Motion
-from motionloom.runtime.shapes import pair_shapes
 from motionloom.tasks.splice import move_rigidly
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from tests.recorded.graphs import block_of, graph, random_weights
 
 CLIP = Path(__file__).parents[4] / "examples" / "clips" / "walk.bvh"

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.viz.figure import figure
 
 

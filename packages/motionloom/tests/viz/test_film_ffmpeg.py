@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.viz import film
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motionloom.errors import MotionloomError
-from motionloom.kinematics.ik import motion_from_positions
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
 from motionloom.viz import draw
 from motionloom.viz.video import CAPTION, GAP, POSE, draw_grid
 from tests.kinematics.people import FPS, standing, walking

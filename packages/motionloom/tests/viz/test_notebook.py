@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motionloom.motion import Motion
-from motionloom.rotations import rotvec_to_quat
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.viz.notebook import MAX_BYTES
 from tests.viz.test_video import standing
 

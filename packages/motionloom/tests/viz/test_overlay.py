@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.viz import draw, overlay
 from motionloom.viz.overlay import PALETTE, PAST, TRUTH, draw_futures, draw_scene, tint
 from motionloom.viz.scene import Actor, Stage, azimuth_of, follow

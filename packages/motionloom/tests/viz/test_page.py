@@ -14,13 +14,13 @@ from motionloom import io
 from motionloom.cli import main
 from motionloom.cli.sampling import places as places_of
 from motionloom.cli.skeletons import Target
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.rotations import rotvec_to_quat
 from motionloom.io.character import load_character
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_read import load_glb
-from motionloom.motion import Motion
 from motionloom.retarget import joints22, retarget
-from motionloom.rotations import rotvec_to_quat
 from motionloom.viz import page
 from tests.io.rigged import Hero
 from tests.viz.test_video import standing

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from motionloom import io
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.viz.overlay import tint
 
 

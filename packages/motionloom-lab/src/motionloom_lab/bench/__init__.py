@@ -13,9 +13,9 @@ from typing import Any, Literal
 
 import onnxruntime
 
-from motionloom.runtime.session import threads
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Prior
+from motionloom.core.models.networks.session import threads
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Prior
 from motionloom_lab.bench.long import FULL, QUICK, entries_of, long_motion
 from motionloom_lab.bench.prediction import cost_of_futures
 from motionloom_lab.bench.speed import (

@@ -8,15 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.diffusion import Denoiser, lerp, levels, row_noise
-from motionloom.goals.segment import TRANSITION, Segment
-from motionloom.io.stream import open_stream
-from motionloom.runtime.prior_condition import Bound
-from motionloom.tasks.long import BATCH, compose_stream
-from motionloom.tasks.text import SOLVER, SPACING
-from motionloom.weights.prior import Prior
-from motionloom_lab.bench.speed import Entry, Process, Sampling, fit, process, timed
-from motionloom_lab.papers.double_take import (
+from motionloom.core.diffusion import Denoiser, lerp, levels, row_noise
+from motionloom.core.methods.double_take import (
     HANDSHAKE,
     MODES,
     Plan,
@@ -26,6 +19,13 @@ from motionloom_lab.papers.double_take import (
     sandwiches,
     second_take,
 )
+from motionloom.core.models.networks.prior_condition import Bound
+from motionloom.core.models.prior import Prior
+from motionloom.goals.segment import TRANSITION, Segment
+from motionloom.io.stream import open_stream
+from motionloom.tasks.long import BATCH, compose_stream
+from motionloom.tasks.text import SOLVER, SPACING
+from motionloom_lab.bench.speed import Entry, Process, Sampling, fit, process, timed
 from motionloom_train.data.progress import Say, silent
 
 ACTIONS = (

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.skeleton import SMPL22
+from motionloom.core.methods.humanmac import published_futures
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.skeleton import SMPL22
 from motionloom.tasks.completion import STEPS, futures
-from motionloom.weights.predictor import Predictor
 from motionloom_lab.bench.speed import Entry, timed
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
-from motionloom_lab.papers.humanmac import published_futures
 from motionloom_train.data.prediction import Protocol, Recording
 from motionloom_train.data.progress import Say, silent
 from motionloom_train.predictor import Settings, Windows, new_predictor

@@ -18,10 +18,10 @@ import torch
 from torch.nn.attention import SDPBackend, sdpa_kernel
 from torch.utils.flop_counter import FlopCounterMode
 
-from motionloom.diffusion import DDPM, SOLVERS, Denoiser, Solver, guide, levels, row_noise, sample
-from motionloom.errors import MotionloomError
+from motionloom.core.diffusion import DDPM, SOLVERS, Denoiser, Solver, guide, levels, row_noise, sample
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
-from motionloom.weights.prior import Prior
 from motionloom_train.modules import prior_module
 from motionloom_train.tensors import conditions, tensor
 

@@ -37,8 +37,8 @@ def run_bench(arguments: argparse.Namespace) -> None:
 
 def _weights(arguments: argparse.Namespace) -> str:
     """Name and hash of what was measured, by which pages that show the table are held against what ships."""
-    from motionloom.weights.predictor import find_predictor
-    from motionloom.weights.prior import find_weights
+    from motionloom.core.models.predictor import find_predictor
+    from motionloom.core.models.prior import find_weights
     from motionloom_lab.suites.harness import weight_marks
 
     if arguments.prediction:
@@ -50,7 +50,7 @@ def _weights(arguments: argparse.Namespace) -> str:
 
 
 def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
-    from motionloom.weights.prior import Prior
+    from motionloom.core.models.prior import Prior
     from motionloom_lab.bench import Sampling, bench
     from motionloom_lab.suites.harness import say
 
@@ -66,7 +66,7 @@ def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:
-    from motionloom.weights.predictor import Predictor
+    from motionloom.core.models.predictor import Predictor
     from motionloom_lab.bench import bench_prediction
     from motionloom_lab.suites.harness import say
 

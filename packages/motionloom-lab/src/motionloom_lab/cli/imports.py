@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from motionloom.cli.tables import add_family
 from motionloom.cli.writing import check_overwriting
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from motionloom.weights.pair import PairBlock
-    from motionloom.weights.prior import Prior
+    from motionloom.core.models.pair import PairBlock
+    from motionloom.core.models.prior import Prior
 
 
 def add(subparsers) -> None:
@@ -23,8 +23,8 @@ def add(subparsers) -> None:
 
 def run_import(arguments: argparse.Namespace) -> None:
     """``motionloom import CHECKPOINT``."""
-    from motionloom.io.atomic import check_place
-    from motionloom.weights.prior import save_prior
+    from motionloom.core.files.atomic import check_place
+    from motionloom.core.models.prior import save_prior
     from motionloom_lab.papers.mdm import is_pair, read_published
     from motionloom_lab.papers.published_priors import import_published, is_humanmac
 
@@ -71,7 +71,7 @@ def _imported_block(arguments: argparse.Namespace, prior: "Prior") -> "PairBlock
 
 
 def _import_predictor(arguments: argparse.Namespace) -> None:
-    from motionloom.weights.predictor import save_predictor
+    from motionloom.core.models.predictor import save_predictor
     from motionloom_lab.papers.published_priors import import_humanmac
 
     if arguments.mean or arguments.std:

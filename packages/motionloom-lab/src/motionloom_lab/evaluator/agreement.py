@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.physics import Array
 from motionloom.tasks.text import sample_features
-from motionloom.weights.prior import Prior
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics.actions import measure
 from motionloom_lab.metrics.obedience import CHECKS, Check

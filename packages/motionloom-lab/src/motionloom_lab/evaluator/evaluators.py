@@ -11,8 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import Representation
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import Representation
 from motionloom.kinematics.physics import Array
 
 

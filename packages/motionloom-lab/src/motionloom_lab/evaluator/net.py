@@ -16,13 +16,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT
-from motionloom.features.representation import HUMANML3D, Representation, named
-from motionloom.runtime.text.minilm import MiniLM
-from motionloom.runtime.text.protocol import TextEncoder
-from motionloom.weights.container import Container, check, halved
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.features.representation import HUMANML3D, Representation, named
+from motionloom.core.models.container import Container, check, halved
+from motionloom.core.models.networks.text.minilm import MiniLM
+from motionloom.core.models.networks.text.protocol import TextEncoder
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_train.modules import arrays, shapes
 from motionloom_train.tensors import tensor

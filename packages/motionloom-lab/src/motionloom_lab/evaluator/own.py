@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS
-from motionloom.features.representation import HUMANML3D
-from motionloom.io.atomic import finished
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.representation import HUMANML3D
+from motionloom.core.files.atomic import finished
 from motionloom.kinematics.physics import Array
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.evaluator.net import Embedder, is_embedder, load_embedder

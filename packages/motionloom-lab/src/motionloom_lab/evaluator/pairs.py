@@ -12,8 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.features import humanml
-from motionloom.features.representation import HUMANML3D
+from motionloom.core.features import humanml
+from motionloom.core.features.representation import HUMANML3D
 from motionloom_train.data.sets import Item, MotionSet, load_set, read_clips
 from motionloom_train.data.words import STATES, mirror_text
 

@@ -8,10 +8,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import LAYOUT
-from motionloom.features.representation import HUMANML3D
-from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.features.representation import HUMANML3D
+from motionloom.core.models.networks.text.protocol import TextEncoder
 from motionloom_lab.evaluator.net import (
     Embedder,
     EvaluatorConfig,

@@ -5,11 +5,11 @@
 
 import numpy as np
 
+from motionloom.core.reading import read_table
 from motionloom.kinematics import gestures as g
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array, J
 from motionloom.kinematics.wholeness import wholeness
-from motionloom.reading import read_table
 
 Measures = dict[str, float]
 

@@ -10,10 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import HUMANML_BONE_LENGTHS, SMPL22
 from motionloom.kinematics.physics import Array, J
 from motionloom.kinematics.wholeness import angles
-from motionloom.skeleton import HUMANML_BONE_LENGTHS, SMPL22
 
 LEVELS = (0.5, 5.0, 50.0, 95.0, 99.5)
 """Percentiles of recorded people that are kept of each number."""

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import read_utf8
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import read_utf8
+from motionloom.core.reading import read_table
 from motionloom.kinematics.physics import Array
 from motionloom.kinematics.wholeness import ENOUGH, wholeness
-from motionloom.reading import read_table
 from motionloom_lab.metrics.actions import Measures, measure
 from motionloom_lab.metrics.everyday.body import Body
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.capsules import RADII, capsule_ends, gaps, overlap
 from motionloom.kinematics.physics import Array

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom_lab.metrics import pair as mp

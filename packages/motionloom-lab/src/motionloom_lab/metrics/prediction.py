@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics.prediction_body import H36M_LIMBS as H36M_LIMBS
 from motionloom_lab.metrics.prediction_body import Limbs, angle_error, as_poses, as_window, jerk, seam, stretch
 from motionloom_lab.metrics.prediction_body import limbs_of as limbs_of

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.reading import read_table
 from motionloom.kinematics import physics
-from motionloom.reading import read_table
 
 Array = NDArray[np.float64]
 

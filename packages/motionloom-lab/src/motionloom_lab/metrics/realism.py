@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from motionloom.core.reading import read_table
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 
 LIMIT = 1.5
 """How many times the real number is still taken for real."""

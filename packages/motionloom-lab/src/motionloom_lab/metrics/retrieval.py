@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 Array = NDArray[np.float64]
 _CELLS = 4_000_000

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom_lab.metrics.retrieval import Array
 
 JERK_HUMANML3D = 0.033031363

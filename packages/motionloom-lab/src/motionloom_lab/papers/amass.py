@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.io import npz, text
-from motionloom.io.atomic import finished
-from motionloom.io.text import plain_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.files import text
+from motionloom.core.files.atomic import finished
+from motionloom.core.files.text import plain_json
+from motionloom.io import npz
 from motionloom_lab.papers import babel
 from motionloom_lab.papers.benchmark_layouts import TABLES
 from motionloom_train.data.paths import DAMAGED

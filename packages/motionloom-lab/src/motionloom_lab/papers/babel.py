@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features.babel import FPS, Y_UP, encode
-from motionloom.io import npz, text
-from motionloom.io.atomic import check_place
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.babel import FPS, Y_UP, encode
+from motionloom.core.files import text
+from motionloom.core.files.atomic import check_place
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
+from motionloom.io import npz
 from motionloom_lab.report.files import write_json
 from motionloom_train.data.clips import Clip, Note, write_clip
 from motionloom_train.data.paths import DAMAGED, inside

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.blending import shares
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion, heading
+from motionloom.core import rotations as rot
+from motionloom.core.blending import shares
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion, heading
 
 BLANK = 8
 """Frames between two segments that nobody generated (TEACH's own number)."""

@@ -3,8 +3,8 @@ the world; and whatever else ``benchmarks.toml`` has of them."""
 
 from typing import Any
 
-from motionloom.features.positions import Layout
-from motionloom.reading import read_table
+from motionloom.core.features.positions import Layout
+from motionloom.core.reading import read_table
 
 TABLES: dict[str, Any] = read_table("motionloom_lab.papers", "benchmarks.toml")
 

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.io import npz, text
-from motionloom.io.atomic import finished
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import text
+from motionloom.core.files.atomic import finished
+from motionloom.io import npz
 from motionloom_lab.papers.amass import AMASS_LICENCE, is_amass, read_amass
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT, TABLES
 from motionloom_lab.papers.plain_pickle import Tables, read_tables

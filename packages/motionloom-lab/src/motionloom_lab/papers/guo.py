@@ -15,10 +15,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import Representation, of_width
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import Representation, of_width
+from motionloom.core.models.container import Container
 from motionloom.kinematics.physics import Array
-from motionloom.weights.container import Container
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.papers.guo_nets import UNIT, GuoNets, from_state_dict, read_guo
 from motionloom_lab.papers.guo_words import SPECIAL, TAGS, TOKENS, Words, padded, read_array, read_words

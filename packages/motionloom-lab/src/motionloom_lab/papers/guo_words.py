@@ -15,10 +15,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import plain_json
+from motionloom.core.reading import read_bytes
 from motionloom.io import npz
-from motionloom.io.text import plain_json
-from motionloom.reading import read_bytes
 from motionloom_lab.papers.plain_pickle import read_plain_file
 from motionloom_train.data.paths import DAMAGED
 

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.features.pair import PUBLISHED_CODE
-from motionloom.io.text import plain_json, read_bytes
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.pair import PUBLISHED_CODE
+from motionloom.core.files.text import plain_json, read_bytes
 from motionloom_lab.papers.torch_file import is_plain, read_torch_file
 from motionloom_train.modules import fill
 from motionloom_train.nets.pair import PairConfig, Talk

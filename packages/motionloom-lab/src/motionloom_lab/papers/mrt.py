@@ -21,11 +21,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.diffusion import Dct
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.core.diffusion import Dct
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.models.container import Container
 from motionloom.kinematics.physics import turned
-from motionloom.weights.container import Container
 from motionloom_train.data.pairs import Pair, mirrored
 from motionloom_train.loop import Average, Training
 from motionloom_train.modules import arrays, fill

@@ -22,10 +22,10 @@ from typing import Any, BinaryIO, cast
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.io import text
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import text
+from motionloom.core.reading import read_bytes
 from motionloom.io.npz import opened, read_header
-from motionloom.reading import read_bytes
 
 MAX_OPERATIONS = 1 << 18
 """Operations of one file. Each costs microseconds; a list of 50,000 words takes 100,000."""

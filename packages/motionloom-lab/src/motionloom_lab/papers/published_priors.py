@@ -8,14 +8,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.diffusion import SCHEDULES, Dct
-from motionloom.errors import MotionloomError
-from motionloom.runtime.predictor import PredictorConfig
-from motionloom.runtime.text.published import PublishedText
-from motionloom.weights.adapter import fingerprint
-from motionloom.weights.pair import UNKNOWN, PairBlock
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Card, Prior
+from motionloom.core.diffusion import SCHEDULES, Dct
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.adapter import fingerprint
+from motionloom.core.models.networks.predictor import PredictorConfig
+from motionloom.core.models.networks.text.published import PublishedText
+from motionloom.core.models.pair import UNKNOWN, PairBlock
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Card, Prior
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom_lab.papers.mdm import (
     FRAME_RATES,

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.tensors import save_tensors
 from motionloom_lab.papers.torch_file import read_torch_file
 
 

@@ -20,14 +20,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS, WIDTH
-from motionloom.features.pair import PlaceCode, decode
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.features.pair import PlaceCode, decode
+from motionloom.core.files.atomic import finished
+from motionloom.core.files.text import read_utf8
 from motionloom.io import npz
-from motionloom.io.atomic import finished
-from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import ANKLES, TOES, Array, J, smooth, velocity
 from motionloom.kinematics.shared_world import checked, one_world
 from motionloom.retarget.floor import level

@@ -18,8 +18,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import read_bytes
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import read_bytes
 from motionloom_lab.papers.plain_pickle import BROKEN, NAMES, OPERATIONS, PlainUnpickler
 
 MAX_BYTES = 2 << 30

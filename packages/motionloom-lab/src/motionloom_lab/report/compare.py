@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import finished
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import finished
 from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import REAL, Column, Report, Row, Value
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from motionloom.io.atomic import atomic_path, check_place
+from motionloom.core.files.atomic import atomic_path, check_place
 
 
 def markdown(rows: Sequence[Sequence[str]]) -> str:

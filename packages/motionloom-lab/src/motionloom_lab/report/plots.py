@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.io.atomic import atomic_path
+from motionloom.core.files.atomic import atomic_path
 from motionloom_lab.report.compare import is_control, wilson
 from motionloom_lab.report.report import ARROWS, REAL, Column, Report, Row, Value
 

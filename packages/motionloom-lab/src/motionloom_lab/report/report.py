@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import plain_json
-from motionloom.reading import read_bytes
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import plain_json
+from motionloom.core.reading import read_bytes
 from motionloom_lab.report.files import check_report, write_json, write_text
 from motionloom_lab.report.files import markdown as table
 from motionloom_lab.report.files import plain as columns_of_text

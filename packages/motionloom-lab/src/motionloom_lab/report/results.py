@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from motionloom.errors import MotionloomError
-from motionloom.reading import read_bytes
+from motionloom.core.errors import MotionloomError
+from motionloom.core.reading import read_bytes
 from motionloom_lab.report.files import write_text
 from motionloom_lab.report.report import Report, markdown
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 from motionloom_lab.report.report import Column, Row, Value
 
 _read = cache(read_table)

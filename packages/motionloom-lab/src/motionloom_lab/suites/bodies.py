@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.reading import read_table
 from motionloom.kinematics.physics import Array
 from motionloom.kinematics.wholeness import whole_frames
-from motionloom.reading import read_table
 from motionloom_lab.metrics import bodies
 from motionloom_lab.papers.readers import find_takes
 from motionloom_train.data.progress import Say, silent

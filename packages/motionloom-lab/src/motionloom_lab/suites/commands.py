@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
-from motionloom.weights.prior import Prior, find_weights
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior, find_weights
 from motionloom_lab.report import files
 from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import Report
@@ -151,7 +151,7 @@ def study(asked: Asked) -> None:
 
 def make_reference(asked: Asked) -> None:
     """The real numbers that runs without --data show, for `text` or `transitions`."""
-    from motionloom.features.representation import HUMANML3D
+    from motionloom.core.features.representation import HUMANML3D
     from motionloom_lab.suites import measures, protocol, real_seams, text_reference
     from motionloom_lab.suites.items import built_of, fitting, read_items
 

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.models.adapter import adapters
 from motionloom.kinematics.physics import Array
 from motionloom.tasks.text import GUIDANCE, STEPS
-from motionloom.weights.adapter import adapters
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics import control as metrics
 from motionloom_lab.metrics.control import ControlError

@@ -11,13 +11,13 @@ from typing import Literal
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS, WIDTH, mask
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FPS, WIDTH, mask
+from motionloom.core.ground import GroundPose
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import Goal
-from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
-from motionloom.skeleton import SMPL22
 
 TRAJECTORY, WHOLE = "trajectory", "whole"
 JOINTS = ("left_wrist", "right_wrist", "left_foot", "right_foot", "head")

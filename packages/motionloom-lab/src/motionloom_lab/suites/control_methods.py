@@ -8,18 +8,19 @@ from typing import Protocol as Interface
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.methods.blending import control_by_blending
+from motionloom.core.methods.edit import Observed
+from motionloom.core.methods.walk import Walk
+from motionloom.core.models.adapter import Adapter, adapted, adapters
+from motionloom.core.models.container import PRIORS
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.kinematics.physics import Array
-from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH as ROWS
-from motionloom.runtime.prior import PriorSession
-from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import sample_features, to_motion
-from motionloom.weights.adapter import Adapter, adapted, adapters
-from motionloom.weights.container import PRIORS
-from motionloom.weights.prior import Prior
-from motionloom_lab.papers.diffusion_blending import control_features
 from motionloom_lab.suites.control_kinds import Kind, Target
 from motionloom_lab.suites.protocol import Drawing
 
@@ -155,7 +156,7 @@ def uncontrolled(prior: Prior, how: Drawing, *, exported: bool) -> Method:
 
 
 def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise_free: bool) -> Method:
-    """Control in the representation: the fixed numbers are written into every estimate (`diffusion_blending`)."""
+    """Control in the representation: the fixed numbers are written into every estimate (`core.methods.blending`)."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Track]:
         result: dict[int, Track] = {}
@@ -165,7 +166,7 @@ def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise
             real = np.stack([target.known for target in some]).astype(np.float32)
             known = Observed((real - prior.mean) / prior.std, mask, noise_free)
             prompts, own = [target.prompt for target in some], [seeds[row] for row in rows]
-            features = prior.to_features(control_features(prior, nets, prompts, known, seeds=own, **how))
+            features = prior.to_features(control_by_blending(prior, nets, prompts, known, seeds=own, walk=Walk(**how)))
             fixed = np.where(mask, real, features).astype(np.float64)
             result |= {row: of_features(one) for row, one in zip(rows, fixed, strict=True)}
         return [result[row] for row in range(len(targets))]

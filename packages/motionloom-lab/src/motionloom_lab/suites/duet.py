@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.pair import PairBlock, blocks
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.physics import Array, foot_skate
-from motionloom.weights.pair import PairBlock, blocks
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.papers.mrt import MrtFile
 from motionloom_lab.report.report import REAL, Report, Row, Value

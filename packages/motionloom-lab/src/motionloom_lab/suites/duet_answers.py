@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.diffusion import row_seed
-from motionloom.features import pair as two
-from motionloom.ground import GroundPose
-from motionloom.kinematics.ik import motion_from_positions
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.diffusion import row_seed
+from motionloom.core.features import pair as two
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.physics import Array
 from motionloom.tasks.duet import react
 from motionloom.tasks.people import Duet
 from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.report.report import Value
 from motionloom_lab.report.tables import columns, notes

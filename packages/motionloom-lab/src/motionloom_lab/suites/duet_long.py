@@ -6,15 +6,15 @@ Their last stretch, and their first, are judged as duets from words are.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.segment import Segment
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose
 from motionloom.tasks.people import Duet
 from motionloom.tasks.text import frames_in
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.report.tables import notes
 from motionloom_lab.suites import duet_text as judged

@@ -13,15 +13,15 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
-from motionloom.features.pair import PairMotion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.physics import Array
 from motionloom.tasks.pair import PairEdits, generate_pair, pair_features, person_seeds
 from motionloom.tasks.people import Duet, finish_person, known_state
 from motionloom.tasks.text import GUIDANCE, STEPS, frames_in
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.metrics import pair_groups as groups
 from motionloom_lab.report.report import REAL, Column, Report, Row, Value

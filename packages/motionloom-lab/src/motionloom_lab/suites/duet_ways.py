@@ -11,18 +11,18 @@ import numpy as np
 import torch
 from torch import nn
 
-from motionloom.diffusion import row_seed
-from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
-from motionloom.features.pair import PairMotion
+from motionloom.core.diffusion import row_seed
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import pair as two
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.models.networks.pair import PairSession
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior, save_prior
 from motionloom.kinematics.physics import Array
-from motionloom.runtime.pair import PairSession
 from motionloom.tasks.long import holding_correction
 from motionloom.tasks.pair import PairEdits, pair_features, person_seeds
 from motionloom.tasks.people import known_state
 from motionloom.tasks.text import STEPS
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior, save_prior
 from motionloom_lab.metrics.pair import PREFIX
 from motionloom_lab.metrics.prediction import constant_velocity, zero_velocity
 from motionloom_lab.papers.mrt import Mrt, completed

@@ -9,11 +9,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import plain_json
-from motionloom.reading import read_bytes
-from motionloom.weights.container import weights_digest
-from motionloom.weights.prior import find_weights
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import plain_json
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.prior import find_weights
+from motionloom.core.reading import read_bytes
 from motionloom_lab.report import files
 from motionloom_lab.report import report as reports
 from motionloom_lab.report.report import Report

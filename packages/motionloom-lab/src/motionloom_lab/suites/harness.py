@@ -14,17 +14,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS
-from motionloom.features.representation import HUMANML3D, Representation
-from motionloom.io.text import plain_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.representation import HUMANML3D, Representation
+from motionloom.core.files.text import plain_json
+from motionloom.core.models.container import weights_digest
+from motionloom.core.models.prior import Prior, find_weights
+from motionloom.core.reading import read_bytes
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_bytes
 from motionloom.tasks.text import generate, sample_features
-from motionloom.weights.container import weights_digest
-from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.evaluator import evaluators, own
 from motionloom_lab.evaluator.evaluators import Evaluator
 from motionloom_lab.metrics import retrieval

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
-from motionloom.features.representation import BABEL, HUMANML3D, Representation, named
-from motionloom.io.atomic import finished
-from motionloom.io.text import plain_json, read_utf8
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.representation import BABEL, HUMANML3D, Representation, named
+from motionloom.core.files.atomic import finished
+from motionloom.core.files.text import plain_json, read_utf8
+from motionloom.core.reading import read_bytes
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_bytes
 from motionloom_lab.evaluator.evaluators import Caption
 from motionloom_lab.papers.readers import find_pairs, find_takes
 from motionloom_lab.suites.protocol import MOST_ITEMS, Selection

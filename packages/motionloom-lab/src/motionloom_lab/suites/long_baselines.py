@@ -12,17 +12,17 @@ from typing import Literal, TypeAlias, Unpack
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS
-from motionloom.features.representation import HUMANML3D, of_width
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.representation import HUMANML3D, of_width
+from motionloom.core.methods.double_take import TakeSettings, double_take_features, rows_of
+from motionloom.core.models.prior import Prior
 from motionloom.goals.segment import Segment
-from motionloom.kinematics.ik import motion_from_positions
 from motionloom.tasks.long import compose, long_features
 from motionloom.tasks.text import sample_features
-from motionloom.weights.prior import Prior
 from motionloom_lab.papers.baselines import BLANK, slerp_joined
-from motionloom_lab.papers.double_take import TakeSettings, double_take_features, rows_of
 from motionloom_lab.suites.protocol import Transitions
 
 Array: TypeAlias = np.ndarray

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.reading import read_table
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 from motionloom_lab.suites.harness import Generate
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.clips import MANNER, Clip

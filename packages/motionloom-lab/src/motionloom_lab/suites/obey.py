@@ -11,15 +11,15 @@ from pathlib import Path
 from statistics import median_high
 from typing import Any
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import with_folders
-from motionloom.io.text import plain_json
-from motionloom.kinematics.ik import motion_from_positions
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import with_folders
+from motionloom.core.files.text import plain_json
+from motionloom.core.models.prior import Prior
+from motionloom.core.reading import read_bytes
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_bytes
 from motionloom.viz import draw
 from motionloom.viz.video import draw_grid
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import CHECKS, THEMES, Check
 from motionloom_lab.report.files import check_report, write_json
 from motionloom_lab.suites.harness import Generate, Run, generator

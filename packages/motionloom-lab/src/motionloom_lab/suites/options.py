@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.cli.tables import Option
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 NOT_TYPED = {"weights", "data", "out", "json", "device", "threads", "force", "quick", "keep", "rows-without-published"}
 """Options that a command to measure the same again has in another place, or that change no number."""

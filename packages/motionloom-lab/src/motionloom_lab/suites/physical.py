@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.features.layout import FPS
+from motionloom.core.features.layout import FPS
 from motionloom.kinematics.physics import Array
 from motionloom_lab.metrics.obedience import CHECKS, Check
 from motionloom_lab.metrics.realism import NUMBERS, average, speed_distance

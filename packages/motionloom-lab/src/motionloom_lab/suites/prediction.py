@@ -1,7 +1,7 @@
 """How good predicted futures are: the tables of stochastic motion prediction, on data that somebody has.
 
 Rows: the real futures, both baselines that need no model, the weights as they are sampled by default and with many
-steps, and the same weights by the published recipe (`lab.papers.humanmac`). Every number is a mean over windows; see
+steps, and the same weights by the published recipe (`core.methods.humanmac`). Every number is a mean over windows; see
 `motionloom_lab.metrics.prediction` for what each is. What others published is kept apart (`report.tables`).
 """
 
@@ -13,13 +13,13 @@ from typing import Any, get_args
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.methods.humanmac import published_futures
+from motionloom.core.models.predictor import Predictor, find_predictor
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
-from motionloom.weights.predictor import Predictor, find_predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.metrics.prediction import Singles
-from motionloom_lab.papers.humanmac import published_futures
 from motionloom_lab.report.report import REAL, SAME, Report, Row
 from motionloom_lab.report.tables import columns, notes, published
 from motionloom_lab.suites import prediction_trial as trials

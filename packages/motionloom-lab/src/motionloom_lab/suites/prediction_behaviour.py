@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.diffusion import row_seed
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import Layout
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.diffusion import row_seed
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import Layout
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.kinematics import physics
-from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.layout_body import body_of_places, layout_skeleton, smpl_joints
-from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known, WindowSampler, next_frames
 from motionloom.tasks.other_joints import sees_person
 from motionloom.tasks.predict import predict, switch
-from motionloom.weights.predictor import Predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.metrics.prediction_body import seam
 from motionloom_lab.report.report import REAL, Column, Row

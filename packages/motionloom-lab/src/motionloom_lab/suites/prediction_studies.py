@@ -11,11 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from motionloom.diffusion import SCHEDULES
-from motionloom.errors import MotionloomError
+from motionloom.core.diffusion import SCHEDULES
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.predictor import Predictor, find_predictor, load_predictor
 from motionloom.requests.sampling import PredictionSampling
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
-from motionloom.weights.predictor import Predictor, find_predictor, load_predictor
 from motionloom_lab.papers.benchmarks import find_protocol
 from motionloom_lab.report import files, plots, results
 from motionloom_lab.report import report as reports

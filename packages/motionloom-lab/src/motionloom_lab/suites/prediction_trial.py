@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS
-from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.io.atomic import finished
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.files.atomic import finished
+from motionloom.core.models.predictor import Predictor
 from motionloom.kinematics.layout_body import places_on_layout
-from motionloom.weights.predictor import Predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom_lab.papers.benchmarks import find_protocol

@@ -11,11 +11,11 @@ from functools import cache
 from string import Formatter
 from typing import Any, Literal, TypedDict
 
-from motionloom.diffusion import SOLVERS
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
-from motionloom.features.representation import Representation
-from motionloom.reading import read_table
+from motionloom.core.diffusion import SOLVERS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.representation import Representation
+from motionloom.core.reading import read_table
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 
 SPLITS = ("train", "val", "test")

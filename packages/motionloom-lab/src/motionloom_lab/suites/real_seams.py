@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import HUMANML3D, of_width
-from motionloom.io.text import plain_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import HUMANML3D, of_width
+from motionloom.core.files.text import plain_json
+from motionloom.core.reading import read_bytes
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_bytes
 from motionloom_lab.evaluator.evaluators import Evaluator
 from motionloom_lab.metrics.transitions import JERK_HUMANML3D, area_under_jerk, jerk_curve, mean_jerk, peak_jerk
 from motionloom_lab.suites.harness import embedded, physical_mean

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from motionloom.features.layout import FPS
+from motionloom.core.features.layout import FPS
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.physics import Array
-from motionloom.weights.prior import Prior
 from motionloom_lab.metrics.obedience import CHECKS
 from motionloom_lab.metrics.realism import NUMBERS, average, compare, speed_distance
 from motionloom_lab.suites.harness import Generate, Run, generator

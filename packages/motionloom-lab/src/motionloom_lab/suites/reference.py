@@ -7,8 +7,8 @@ so that tables can show them where no recordings are at hand. `motionloom evalua
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from motionloom.features.layout import FPS
-from motionloom.reading import read_table
+from motionloom.core.features.layout import FPS
+from motionloom.core.reading import read_table
 from motionloom_lab.metrics.actions import Measures, measure
 from motionloom_lab.metrics.obedience import CHECKS, Check
 from motionloom_lab.metrics.realism import average

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from motionloom.errors import MotionloomError
-from motionloom.reading import read_table
-from motionloom.weights.prior import Prior, find_weights, shipped
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior, find_weights, shipped
+from motionloom.core.reading import read_table
 from motionloom_lab.report.report import Report
 from motionloom_lab.suites import items, measures
 from motionloom_lab.suites.harness import Generate, Run, evaluator_file
@@ -112,9 +112,9 @@ def _files(kinds: Sequence[str]) -> Callable[[Job], Sequence[Path]]:
     """The files of some kinds, as far as they are there."""
 
     def find(job: Job) -> list[Path]:
-        from motionloom.weights.adapter import adapters
-        from motionloom.weights.pair import blocks
-        from motionloom.weights.predictor import shipped_predictors
+        from motionloom.core.models.adapter import adapters
+        from motionloom.core.models.pair import blocks
+        from motionloom.core.models.predictor import shipped_predictors
         from motionloom_lab.suites import real_seams, text_reference
 
         every: dict[str, Callable[[], Sequence[Path | None]]] = {

@@ -15,10 +15,10 @@ from typing import cast
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.physics import Array
 from motionloom.tasks.text import sample_features
-from motionloom.weights.prior import Prior
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics.retrieval import fid, fid_bias, matching_distance, multimodality_of, r_precision
 from motionloom_lab.report.report import REAL, Report, Row, Value

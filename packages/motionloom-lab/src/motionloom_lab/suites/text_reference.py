@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from safetensors import safe_open
 
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import of_width
-from motionloom.io.atomic import check_place
-from motionloom.io.tensors import check_head, save_tensors
-from motionloom.io.text import plain_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import of_width
+from motionloom.core.files.atomic import check_place
+from motionloom.core.files.tensors import check_head, save_tensors
+from motionloom.core.files.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.suites.harness import CHUNK, PHYSICAL, physical

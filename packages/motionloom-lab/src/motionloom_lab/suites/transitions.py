@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import Representation
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import Representation
+from motionloom.core.models.prior import find_weights
 from motionloom.kinematics.physics import Array
-from motionloom.weights.prior import find_weights
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics.retrieval import fid, fid_bias, matching_distance, r_precision
 from motionloom_lab.metrics.transitions import (

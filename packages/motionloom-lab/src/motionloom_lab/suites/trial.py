@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.blending import crossfade, shares
-from motionloom.features.layout import FPS
+from motionloom.core.blending import crossfade, shares
+from motionloom.core.features.layout import FPS
+from motionloom.core.reading import read_table
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
-from motionloom.skeleton import SMPL22
 from motionloom_lab.metrics.everyday.body import Body
 from motionloom_lab.metrics.obedience import Check
 from motionloom_lab.suites.items import RealClip

@@ -11,8 +11,8 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.text.protocol import TextEncoder
 from motionloom_lab.papers import text_model
 from motionloom_train.nets.text import ClipText, DistilBert
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.sampling import fail, request_of
 from motionloom.cli.tables import add_family
 from motionloom.cli.writing import check_overwriting
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.formats import readable
 
 if TYPE_CHECKING:
-    from motionloom.motion import Motion
+    from motionloom.core.motion import Motion
     from motionloom_train.data.examples import CaptionedClip, Example
 
 
@@ -25,7 +25,7 @@ def add(subparsers) -> None:
 
 def run_teach(arguments: argparse.Namespace) -> int:
     """``motionloom teach TEXT CLIP ...``."""
-    from motionloom.io.atomic import check_place
+    from motionloom.core.files.atomic import check_place
     from motionloom_train.data.examples import find_examples
 
     caption, places = _words(arguments.words)
@@ -113,7 +113,7 @@ def _refuse(captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> None
 def _teach(
     arguments: argparse.Namespace, examples: "list[Example]", out: Path, captioned: "list[CaptionedClip]"
 ) -> None:
-    from motionloom.weights.prior import Prior
+    from motionloom.core.models.prior import Prior
     from motionloom_train.teach import Lesson, teach
     from motionloom_train.tensors import set_threads
 

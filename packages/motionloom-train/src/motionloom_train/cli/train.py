@@ -5,7 +5,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from motionloom.cli.tables import add_family
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 if TYPE_CHECKING:
     from motionloom_train.loop import Training

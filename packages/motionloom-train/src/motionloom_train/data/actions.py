@@ -10,10 +10,10 @@ from typing import Literal
 
 import numpy as np
 
+from motionloom.core.reading import read_table
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.gestures import wrist_thrust
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 from motionloom_train.data.words import sentence
 
 Kind = Literal["cycle", "repeats", "change", "once", "state"]

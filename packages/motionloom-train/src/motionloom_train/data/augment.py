@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.blending import crossfade, shares, smootherstep
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS, LAYOUT
+from motionloom.core import rotations as rot
+from motionloom.core.blending import crossfade, shares, smootherstep
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS, LAYOUT
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.clips import Clip

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.reading import read_table
+from motionloom.core.errors import MotionloomError
+from motionloom.core.reading import read_table
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.clips import GESTURE, MEASURED
 from motionloom_train.data.sets import Item, MotionSet

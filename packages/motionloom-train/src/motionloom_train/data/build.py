@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS
-from motionloom.io.atomic import atomic_path, finished, sweep
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS
+from motionloom.core.files.atomic import atomic_path, finished, sweep
 from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment, gate
 from motionloom_train.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to

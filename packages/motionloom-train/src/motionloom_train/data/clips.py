@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from safetensors import safe_open
 
-from motionloom.errors import MotionloomError
-from motionloom.features.representation import Representation, of_width
-from motionloom.io.tensors import check_head, save_tensors
-from motionloom.io.text import plain_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.representation import Representation, of_width
+from motionloom.core.files.tensors import check_head, save_tensors
+from motionloom.core.files.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.actions import PREFIX
 from motionloom_train.data.paths import DAMAGED

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import read_utf8
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import read_utf8
 from motionloom_train.data.sources import Take
 from motionloom_train.data.words import check_caption
 

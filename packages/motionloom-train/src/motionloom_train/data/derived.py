@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS, LAYOUT
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS, LAYOUT
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom_train.data import augment

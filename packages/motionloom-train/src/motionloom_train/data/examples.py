@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS
+from motionloom.core.motion import Motion
+from motionloom.core.reading import read_bytes
 from motionloom.formats import readable
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom.motion import Motion
-from motionloom.reading import read_bytes
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.fidelity import compare

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.features import humanml as hml
+from motionloom.core.body.feet import correction, planted_feet
+from motionloom.core.features import humanml as hml
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import physics as ph
-from motionloom.kinematics.feet import correction, planted_feet
 from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.physics import Array
 from motionloom.retarget import limbs
-from motionloom.skeleton import SMPL22
 
 FEET = ((1, 4, 7, 10, 1.0), (2, 5, 8, 11, -1.0))
 """Hip, knee, ankle, toes and the sign of outward along +X: left, right."""

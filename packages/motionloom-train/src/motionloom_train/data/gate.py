@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.io.atomic import atomic_path, finished
-from motionloom.io.text import plain_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.files.atomic import atomic_path, finished
+from motionloom.core.files.text import plain_json
 from motionloom.retarget.fidelity import Fidelity, Spread, compare
 from motionloom_train.data.clips import Clip
 from motionloom_train.data.paths import DAMAGED

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS
-from motionloom.io.atomic import atomic_path
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics.physics import Array
-from motionloom.motion import Motion
 from motionloom.retarget.fidelity import LEG
-from motionloom.skeleton import SMPL22
 from motionloom.viz import draw
 from motionloom.viz.draw import Camera
 from motionloom.viz.figure import Figure, figure

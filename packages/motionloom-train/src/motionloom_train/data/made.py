@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from motionloom.core.reading import read_table
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 from motionloom.retarget import limbs
 from motionloom_train.data.words import sentence
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from motionloom.core.body.feet import planted_feet
 from motionloom.kinematics import physics as ph
-from motionloom.kinematics.feet import planted_feet
 from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.gait import Gait

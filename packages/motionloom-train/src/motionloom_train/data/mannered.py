@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS
+from motionloom.core.features import humanml as hml
+from motionloom.core.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom_train.data.actions import PREFIX, side_of

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.body.feet import envelope
+from motionloom.core.reading import read_table
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics import physics as ph
-from motionloom.kinematics.feet import envelope
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 from motionloom.retarget import limbs
-from motionloom.skeleton import SMPL22
 from motionloom_train.data.gait import FEET, LENGTHS, Gait, moved_feet, read_gait, retimed, with_bones
 
 Place = tuple[float, float, float]

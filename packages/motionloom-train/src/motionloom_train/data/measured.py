@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from motionloom.core.reading import read_table
 from motionloom.kinematics import gestures
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.counts import count, foot_moves
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 from motionloom_train.data.actions import ACTIONS, core, strike
 from motionloom_train.data.clips import MEASURED, Note
 from motionloom_train.data.windows import Measures, compare, comparisons, measure

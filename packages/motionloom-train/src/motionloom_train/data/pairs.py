@@ -19,14 +19,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import finished
+from motionloom.core.files.text import read_utf8
+from motionloom.core.reading import read_bytes
+from motionloom.core.skeleton import SMPL22
 from motionloom.io import load
-from motionloom.io.atomic import finished
-from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import Array
 from motionloom.kinematics.shared_world import together
-from motionloom.reading import read_bytes
-from motionloom.skeleton import SMPL22
 from motionloom_train.data import sources
 from motionloom_train.data.paths import DAMAGED, inside
 from motionloom_train.data.progress import Say, silent

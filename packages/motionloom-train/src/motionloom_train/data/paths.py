@@ -6,7 +6,7 @@ from pathlib import Path
 
 from safetensors import SafetensorError
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 DAMAGED = (
     *(OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError),

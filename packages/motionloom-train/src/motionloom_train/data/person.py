@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motionloom.features import humanml as hml
+from motionloom.core.features import humanml as hml
 from motionloom.kinematics.costs import numbers
 from motionloom.kinematics.physics import Array
 

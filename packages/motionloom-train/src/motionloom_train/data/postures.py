@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from motionloom.blending import smootherstep
+from motionloom.core.blending import smootherstep
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom.retarget import limbs

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.features.humanml import resample_positions
-from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.humanml import resample_positions
+from motionloom.core.features.positions import SMPL_LAYOUT, Layout
 from motionloom_train.data.progress import Say, silent
 from motionloom_train.data.sources import Take, find_takes
 

@@ -11,12 +11,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
-from motionloom.features.representation import HUMANML3D, Representation
-from motionloom.io.atomic import finished
-from motionloom.io.text import parse_json, read_utf8
-from motionloom.reading import read_table
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.representation import HUMANML3D, Representation
+from motionloom.core.files.atomic import finished
+from motionloom.core.files.text import parse_json, read_utf8
+from motionloom.core.reading import read_table
 from motionloom_train.data.actions import ACTIONS, PREFIX, briskness, sentences, side_of, strike
 from motionloom_train.data.actions import rests as rests_of
 from motionloom_train.data.clips import GESTURE, MANNER, MEASURED, Clip, Note, read_clip

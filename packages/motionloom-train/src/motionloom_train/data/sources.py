@@ -12,13 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import WIDTH
-from motionloom.io import load, text
-from motionloom.io.atomic import finished
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import WIDTH
+from motionloom.core.files import text
+from motionloom.core.files.atomic import finished
+from motionloom.core.motion import Motion
+from motionloom.io import load
 from motionloom.io.npz import read_array
 from motionloom.kinematics.physics import Array
-from motionloom.motion import Motion
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.upright import AXES
 from motionloom_train.data.paths import DAMAGED, inside

@@ -5,7 +5,7 @@ A window that begins in the middle of a leap or of a stroke teaches that motions
 
 import numpy as np
 
-from motionloom.features.layout import FPS, LAYOUT
+from motionloom.core.features.layout import FPS, LAYOUT
 from motionloom.kinematics.physics import Array
 
 SLOW, LIMBS = 0.4, 1.0

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from motionloom.core.reading import read_table
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.gestures import longest, wrist_thrust
 from motionloom.kinematics.physics import Array
-from motionloom.reading import read_table
 
 Measures = dict[str, float]
 _ANKLES, _FEET, _WRISTS, _SHOULDERS, _HIPS = [7, 8], [7, 8, 10, 11], [20, 21], [16, 17], [1, 2]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 _SWAPS = {
     "left": "right",

@@ -19,13 +19,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.diffusion import Schedule
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import ric
-from motionloom.features.pair import along
-from motionloom.ground import compose, relative, to_world
-from motionloom.runtime.pair import PLACE, SEEN
-from motionloom.runtime.pair import PairConfig as PairConfig
+from motionloom.core.diffusion import Schedule
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import ric
+from motionloom.core.features.pair import along
+from motionloom.core.ground import compose, relative, to_world
+from motionloom.core.models.networks.pair import PLACE, SEEN
+from motionloom.core.models.networks.pair import PairConfig as PairConfig
 from motionloom_train.nets.prior import Bound, Condition, Inner, NetConfig, PriorNet, valid_frames
 from motionloom_train.nets.prior import PublishedBlock as EncoderBlock
 

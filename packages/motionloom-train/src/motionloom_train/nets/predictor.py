@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.runtime.predictor import PredictorConfig
+from motionloom.core.models.networks.predictor import PredictorConfig
 
 
 class TransLinear(nn.Module):

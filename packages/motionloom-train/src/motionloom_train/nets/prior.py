@@ -20,8 +20,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.sizes import NetConfig as NetConfig
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.sizes import NetConfig as NetConfig
 
 
 class Condition(NamedTuple):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.text.minilm import SPECIALS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.text.minilm import SPECIALS
 from tests.recorded.tiny import VOCABULARY
 from tools import compress_text_encoder as compress
 

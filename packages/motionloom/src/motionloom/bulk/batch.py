@@ -16,7 +16,7 @@ from motionloom.bulk.metadata import Result, damaged_table, read_batch, result, 
 from motionloom.bulk.on_robot import check_format
 from motionloom.bulk.row import parse
 from motionloom.bulk.shard import Batch, Report, Task, problems
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import PairSampling

@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from motionloom.bulk.folder import WORK
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 try:
     import fcntl

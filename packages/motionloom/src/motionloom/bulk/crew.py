@@ -17,7 +17,7 @@ from typing import Any
 import motionloom
 from motionloom.bulk.folder import Store
 from motionloom.bulk.shard import Batch, Report, Task, clear_work
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 STILLBORN = 3
 """Processes in a row that may die before they are ready."""

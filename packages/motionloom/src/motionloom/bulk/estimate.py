@@ -13,7 +13,7 @@ from motionloom.bulk.measures import Filter
 from motionloom.bulk.row import Order, parse
 from motionloom.bulk.shard import entry_of
 from motionloom.bulk.writers import sizes, writer
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 SAMPLE = 16
 """Rows that are looked at."""

@@ -25,10 +25,10 @@ from motionloom.bulk.maker import Options, hash_weights
 from motionloom.bulk.measures import MEANING, ROBOT
 from motionloom.bulk.row import FORMAT, hash_file
 from motionloom.bulk.writers import hashes, json_line, leads_out, sizes, suffix, sync
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.models.prior import find_weights, read_card
 from motionloom.io.folder import check_folder
-from motionloom.weights.prior import find_weights, read_card
 
 MANIFEST, RECORDS, WORK = "manifest.json", "records", ".work"
 KIND = "motionloom batch"

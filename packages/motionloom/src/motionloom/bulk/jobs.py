@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom import formats
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.requests.batch import RowKeys
 from motionloom.requests.fields import specs
 

@@ -10,22 +10,22 @@ from typing import Any
 from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
 from motionloom.bulk.on_robot import OnRobot, Save, check_format, on_robot
 from motionloom.bulk.row import Order, Sources, hash_adapters, unexpected
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.container import PAIRS, weights_digest
+from motionloom.core.models.prior import find_weights
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.roles import prompts_of
 from motionloom.io import load
-from motionloom.motion import Motion
 from motionloom.requests.reading import build_request
 from motionloom.requests.sampling import PairSampling, Sampling
 from motionloom.requests.tasks import REQUESTS
 from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import Controlled, evaluate
 from motionloom.tasks.run import Models, Plan, Result, run, run_each
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features
-from motionloom.weights.container import PAIRS, weights_digest
-from motionloom.weights.prior import find_weights
 
 TOGETHER = {"cpu": 8, "cuda": 128}
 """Rows of a network call, by the kind of device."""

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.reading import read_table
 from motionloom.kinematics import physics
-from motionloom.motion import Motion
-from motionloom.reading import read_table
 
 Values = Mapping[str, float | bool | None]
 Judge = Callable[[str, np.ndarray, float], bool | None]

@@ -17,12 +17,12 @@ from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import ROBOT
 from motionloom.bulk.row import hash_file
 from motionloom.bulk.writers import file_names, json_line, leads_out, parquet_schema
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
+from motionloom.core.reading import mended, read_bytes
+from motionloom.core.skeleton import Skeleton
 from motionloom.io import load, load_scene
-from motionloom.io.atomic import atomic_path
-from motionloom.motion import Motion
-from motionloom.reading import mended, read_bytes
-from motionloom.skeleton import Skeleton
 
 TABLE, ABOUT_TABLE = "metadata", "table.json"
 _BLOCK = 10_000

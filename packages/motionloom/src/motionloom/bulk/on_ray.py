@@ -19,7 +19,7 @@ from typing import Any
 
 from motionloom.bulk.crew import ONE_THREAD, Again, Moved, search_path
 from motionloom.bulk.shard import Batch, Report, Task
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 PATIENCE = 1.0
 """Seconds between two looks at what is done."""
@@ -33,7 +33,7 @@ class Hand:
     """What an actor does: shards, one after the other."""
 
     def __init__(self, line: str) -> None:
-        from motionloom.runtime import set_threads
+        from motionloom.core.models.networks import set_threads
 
         set_threads(1)
         self.batch, self.problem = Batch.from_json(line), ""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.robots.body import Robot, read_robot, to_motion
 from motionloom.robots.clip import FPS, put_on_robot
 from motionloom.robots.figures import measure

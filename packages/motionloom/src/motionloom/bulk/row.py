@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 
 from motionloom.bulk.on_robot import OnRobot, on_robot
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.goals.fields import Field
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.roles import MARK, prompts_of
 from motionloom.goals.timeline import SHORTEST, Timeline, read_timeline, timeline_of
 from motionloom.io import load
-from motionloom.io.text import parse_json
-from motionloom.motion import Motion
 from motionloom.requests.batch import RowKeys
 from motionloom.requests.reading import read
 from motionloom.requests.shared import LONGEST, LONGEST_LINE
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.text import frames_in
 
 FORMAT = 2

@@ -15,7 +15,7 @@ from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.measures import Filter
 from motionloom.bulk.row import Order, Unexpected, explained, parse, unexpected
 from motionloom.bulk.writers import Writer, hashes, sizes, writer
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 CAREFUL = 2
 """So often must a shard have been begun and not ended until its rows are sampled one by one."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from motionloom.bulk.claim import living
 from motionloom.bulk.folder import find_batch
 from motionloom.bulk.metadata import damaged_table, table_shards
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 MOST_LOST = 100_000
 """Lost shards that are listed, whatever a damaged file counts."""

@@ -13,7 +13,7 @@ import warnings
 from dataclasses import asdict
 from typing import Any, TextIO
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 
 def main() -> int:
@@ -49,7 +49,7 @@ def _listen(lines: "queue.Queue[str]", source: TextIO = sys.stdin) -> None:
 
 def _work(lines: "queue.Queue[str]", say: Any) -> None:
     from motionloom.bulk.shard import Batch, Task, make_shard
-    from motionloom.runtime import set_threads
+    from motionloom.core.models.networks import set_threads
 
     set_threads(1)  # there is a process for each core
     batch = Batch.from_json(lines.get())

@@ -20,11 +20,11 @@ from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.maker import Made
 from motionloom.bulk.measures import MEANING, SECOND, SHARED
 from motionloom.bulk.row import hash_file
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.files.npz_writer import save_npz
+from motionloom.core.motion import Motion
+from motionloom.core.reading import mended
 from motionloom.io import save, save_scene
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.io.npz_writer import save_npz
-from motionloom.motion import Motion
-from motionloom.reading import mended
 
 ROWS = 64
 """Motions of a row group of a Parquet file: how many are in memory at once."""

@@ -14,8 +14,8 @@ from motionloom.cli.commands import absence, add_commands
 from motionloom.cli.help import HelpAll, help_of
 from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
 from motionloom.cli.terminal import escaping, say
-from motionloom.errors import MotionloomError, one_line
-from motionloom.interruption import interruptible, was_interrupted
+from motionloom.core.errors import MotionloomError, one_line
+from motionloom.core.interruption import interruptible, was_interrupted
 
 
 class _Parser(argparse.ArgumentParser):

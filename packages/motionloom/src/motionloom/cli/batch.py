@@ -18,7 +18,7 @@ from motionloom.bulk.measures import Filter
 from motionloom.bulk.shard import Report
 from motionloom.cli.terminal import escaping, note, say, unescaped
 from motionloom.cli.writing import fail
-from motionloom.runtime import set_threads
+from motionloom.core.models.networks import set_threads
 
 JUDGE = "motionloom_lab.metrics.obedience:obeys"
 LISTED = 10

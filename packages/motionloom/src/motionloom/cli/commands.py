@@ -6,7 +6,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple, NoReturn
 
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 Commands = argparse._SubParsersAction
 Add = Callable[[Commands], None]

@@ -6,7 +6,6 @@ from argparse import Namespace
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +25,13 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import Target
 from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.methods.double_take import double_take_features, rows_of
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.timeline import Timeline
 from motionloom.io.stream import Stream, resampled
 from motionloom.kinematics.deeds import LONGEST, happened
-from motionloom.motion import Motion
 from motionloom.requests.reading import resolve_sampling
 from motionloom.requests.sampling import Sampling
 from motionloom.requests.tasks import Compose
@@ -39,10 +40,7 @@ from motionloom.tasks.long import load_segment_adapters
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import finish
-from motionloom.weights.prior import Prior
 
-DOUBLE_TAKE = "motionloom_lab.papers.double_take"
-"""The method as published, in the laboratory; opened where it is asked for."""
 REMARKED = 200
 """Segments whose texts are looked up among what the weights know."""
 LISTED = 40
@@ -170,14 +168,13 @@ def _double_take(arguments: Namespace, prior: Prior, timeline: Timeline, samplin
     """The timeline's prompts by DoubleTake; each row is longer by what it shares, so that seams are the segments'."""
     if timeline.asks or timeline.start is not None or arguments.loop or any(s.adapters for s in timeline.segments):
         fail("--method doubletake makes prompts alone: no goals, path, start, adapters or --loop")
-    laboratory = import_module(DOUBLE_TAKE)
     names = ("ramp", "soft", "hard", "restart")
     settings = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
     handshake = round(prior.fps) if arguments.handshake is None else arguments.handshake
-    features, _ = laboratory.double_take_features(
+    features, _ = double_take_features(
         prior,
         [segment.text for segment in timeline.segments],
-        laboratory.rows_of([round(segment.seconds * prior.fps) for segment in timeline.segments], handshake),
+        rows_of([round(segment.seconds * prior.fps) for segment in timeline.segments], handshake),
         mode="published" if arguments.method.endswith("published") else "paper",
         handshake=handshake,
         seed=sampling.seed,

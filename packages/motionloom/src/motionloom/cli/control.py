@@ -27,17 +27,17 @@ from motionloom.cli.sampling import (
 )
 from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
-from motionloom.errors import quoted
+from motionloom.core.errors import quoted
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.goal_file import follow, read_goal
 from motionloom.goals.reach import check_reach
-from motionloom.motion import Motion
 from motionloom.requests.tasks import Control
 from motionloom.tasks.control import Adapters, Controlled
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior
 
 
 def run_control(arguments: Namespace) -> int:

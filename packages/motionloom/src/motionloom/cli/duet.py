@@ -21,7 +21,9 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.motion import MAX_POSES, Motion
 from motionloom.formats import characters, writable
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
@@ -31,14 +33,12 @@ from motionloom.io.lined_yaml import fail as fail_at
 from motionloom.io.lined_yaml import read_lined
 from motionloom.io.stream import check_length
 from motionloom.kinematics.capsules import DEEP, overlap, trunk_distance, wrist_distance
-from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.reading import resolve_sampling
 from motionloom.requests.tasks import Duet
 from motionloom.retarget import joints22
 from motionloom.tasks.remarks import remarks_on_words
 from motionloom.tasks.run import Models, Plan
 from motionloom.tasks.text import frames_in
-from motionloom.weights.pair import PairBlock
 
 MAX_SECONDS = 3600.0
 """Of a timeline."""

@@ -18,13 +18,13 @@ from motionloom.cli.robots import check_inputs
 from motionloom.cli.skeletons import Target, read_target
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, fail
+from motionloom.core.motion import Motion
 from motionloom.formats import find
 from motionloom.io import GLTF
 from motionloom.io.bvh import save_bvh, unit_that_reads_back
 from motionloom.io.gltf_read import open_glb
 from motionloom.io.info import describe
 from motionloom.kinematics.deeds import measure_deeds
-from motionloom.motion import Motion
 
 
 def run_export(arguments: Namespace) -> int:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from motionloom.cli.sampling import fail, numbered, write_pieces
 from motionloom.cli.skeletons import Target
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.formats import writable
 from motionloom.io import check_output, check_program
 from motionloom.io.folder import atomic_folder, check_folder
 from motionloom.io.stream import Stream, joined
-from motionloom.motion import Motion
 
 OVERLAYS = (".png", ".mp4", ".gif")
 PICTURED = 50

@@ -27,19 +27,19 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import Target
 from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import check_overwriting
+from motionloom.core.files.text import read_text
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.remarks import numbers_read, parts_read
 from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
-from motionloom.io.text import read_text
 from motionloom.kinematics.gestures import Seat, seats
 from motionloom.kinematics.physics import TOES
 from motionloom.kinematics.stairs import stairs
-from motionloom.motion import Motion
 from motionloom.requests.sampling import SOLVER
 from motionloom.requests.tasks import Generate
 from motionloom.tasks.run import Models, Plan, run_each
 from motionloom.tasks.worded import Worded
-from motionloom.weights.prior import Prior
 
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000

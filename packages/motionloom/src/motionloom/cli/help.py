@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import Any
 
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 SCREEN = 24
 """Options above which they are printed in groups."""

@@ -15,6 +15,10 @@ from motionloom.cli.sampling import check_loop, check_outs, fail, load_prior, lo
 from motionloom.cli.skeletons import Target
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import check_overwriting, check_unit
+from motionloom.core.models.networks import set_threads
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.kinematics.deeds import happened
 from motionloom.live.clock import Health, Player
 from motionloom.live.commands import scaled
@@ -22,10 +26,6 @@ from motionloom.live.live import Frame, Live, Stage, motion_of
 from motionloom.live.pair import LivePair
 from motionloom.live.script import Script, read_script
 from motionloom.live.settings import Settings
-from motionloom.motion import Motion
-from motionloom.runtime import set_threads
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 
 def run_live(arguments: Namespace) -> int:

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Iterable, Sequence
 
 from motionloom.cli.terminal import note
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
 OPTIONS = {"--length": "--seconds", "--duration": "--seconds", "-o": "--out", "--output": "--out", "-n": "--count"}

@@ -16,18 +16,18 @@ from motionloom.cli.sampling import Finished, bar, check_loop_behind, fail, requ
 from motionloom.cli.skeletons import Target, read_target
 from motionloom.cli.terminal import note, say
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.motion import MAX_POSES, Motion
 from motionloom.goals import mask_file
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.io import check_output
 from motionloom.io.layout_places import is_places, read_places
 from motionloom.io.stream import check_length, resampled
-from motionloom.motion import MAX_POSES, Motion
 from motionloom.requests.tasks import Predict, Switch
 from motionloom.retarget import retarget
 from motionloom.tasks.other_joints import on_joints_of, sees_person
 from motionloom.tasks.predict import predict_pieces
 from motionloom.tasks.run import Models, Plan
-from motionloom.weights.predictor import Predictor
 
 LONG = 30.0
 """Seconds from which on futures are written while they are generated, one after the other."""

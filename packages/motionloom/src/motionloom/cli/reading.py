@@ -6,13 +6,13 @@ from pathlib import Path
 from motionloom import io
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import fail
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.formats import with_clips
 from motionloom.io.bvh import read_bvh
-from motionloom.motion import Motion
 from motionloom.retarget.anatomy import HUMAN_LEGS, read_body
 from motionloom.retarget.upright import set_upright
-from motionloom.skeleton import Skeleton
 
 RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
 

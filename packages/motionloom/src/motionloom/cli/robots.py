@@ -11,8 +11,8 @@ from weakref import WeakKeyDictionary
 from motionloom.cli.skeletons import OF_SKELETON, Target, refuse
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import fail
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.retarget import to_smpl22
 
 if TYPE_CHECKING:

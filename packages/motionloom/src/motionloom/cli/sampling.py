@@ -17,12 +17,13 @@ from typing import Any, Generic, TypeVar
 from motionloom.cli.skeletons import Target, own_outs, read_target
 from motionloom.cli.terminal import escaping, note, say, unescaped
 from motionloom.cli.writing import at_rate, check_rate, check_unit, fail
+from motionloom.core.interruption import held_back
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.timeline import Timeline
-from motionloom.interruption import held_back
 from motionloom.io import check_output
 from motionloom.io.stream import Stream
-from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import build_request
 from motionloom.requests.tasks import Generate
@@ -30,7 +31,6 @@ from motionloom.tasks.adapting import adapt
 from motionloom.tasks.edit import Loop, edit
 from motionloom.tasks.remarks import lines_by_text, remarks_on_words
 from motionloom.tasks.run import Models, Plan, Result, run
-from motionloom.weights.prior import Prior
 
 R = TypeVar("R")
 

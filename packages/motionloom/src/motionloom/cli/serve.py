@@ -63,7 +63,7 @@ def _checked(arguments: Namespace) -> "tuple[Applied, ...]":
 
 def _set_threads(arguments: Namespace) -> None:
     if arguments.threads is not None:
-        from motionloom.runtime import set_threads
+        from motionloom.core.models.networks import set_threads
 
         set_threads(arguments.threads)
 

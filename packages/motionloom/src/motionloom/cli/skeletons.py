@@ -12,17 +12,18 @@ from motionloom import io
 from motionloom.cli.reading import legs_of
 from motionloom.cli.terminal import note
 from motionloom.cli.writing import fail
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.formats import characters, find, readable
-from motionloom.ground import GroundPose
 from motionloom.io.asf import load_skeleton
 from motionloom.io.bvh import read_bvh
-from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.character import Character
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_read import open_glb
 from motionloom.io.stream import PERSON, Kept, Stream, check_length, open_stream
-from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import RootMode, retarget
 from motionloom.retarget.anatomy import HUMAN_LEGS, Body, read_body
 from motionloom.retarget.hands import HandPose, check_fingers, pose_hands
@@ -30,7 +31,6 @@ from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.root import place_root
 from motionloom.retarget.stand import HERE, moved, shares_world, started, world_of
 from motionloom.retarget.toes import bend_toes
-from motionloom.skeleton import SMPL22, Skeleton
 
 
 @dataclass(frozen=True)

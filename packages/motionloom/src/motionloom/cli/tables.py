@@ -25,8 +25,8 @@ from typing import Any
 
 from motionloom.cli.newcomers import option_names, take_text_anywhere
 from motionloom.cli.options import PrintSchema, add_options, as_unit
+from motionloom.core.reading import read_table
 from motionloom.formats import readable, writable
-from motionloom.reading import read_table
 
 Table = dict[str, Any]
 READERS: dict[str, Callable[[str], Any]] = {"text": str, "int": int, "float": float, "path": Path, "unit": as_unit}

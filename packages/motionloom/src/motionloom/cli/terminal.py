@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
-from motionloom.errors import printable
+from motionloom.core.errors import printable
 
 
 class _Escaped:

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.cli.writing import check_overwriting, fail
-from motionloom.io.atomic import check_place
-from motionloom.weights.adapter import read_adapter
-from motionloom.weights.container import ADAPTERS, PAIRS, PREDICTORS
-from motionloom.weights.pair import blocks, read_block
-from motionloom.weights.predictor import Predictor, load_predictor, shipped_predictors
-from motionloom.weights.prior import Prior, find_weights, load_prior, shipped
+from motionloom.core.files.atomic import check_place
+from motionloom.core.models.adapter import read_adapter
+from motionloom.core.models.container import ADAPTERS, PAIRS, PREDICTORS
+from motionloom.core.models.pair import blocks, read_block
+from motionloom.core.models.predictor import Predictor, load_predictor, shipped_predictors
+from motionloom.core.models.prior import Prior, find_weights, load_prior, shipped
 
 TRAINING = "motionloom_train.convert"
 """The module that writes graphs, which needs PyTorch."""

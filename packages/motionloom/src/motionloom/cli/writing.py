@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.terminal import note
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 
 if TYPE_CHECKING:
-    from motionloom.motion import Motion
+    from motionloom.core.motion import Motion
 
 
 def fail(message: str) -> NoReturn:

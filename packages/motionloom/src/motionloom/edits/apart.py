@@ -10,8 +10,8 @@ sampled is bent out of it (`out_of_bodies`).
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import smoothstep
-from motionloom.features.pair import PairMotion
+from motionloom.core.blending import smoothstep
+from motionloom.core.features.pair import PairMotion
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, gaps
 from motionloom.kinematics.physics import J
 

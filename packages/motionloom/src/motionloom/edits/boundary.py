@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import cubic_decay
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT
+from motionloom.core import rotations as rot
+from motionloom.core.blending import cubic_decay
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT
 
 Array = NDArray[np.float64]
 

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.arrays import true_spans
+from motionloom.core import rotations as rot
+from motionloom.core.arrays import true_spans
+from motionloom.core.body.feet import planted_feet
+from motionloom.core.body.ik import LIMBS
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FEET
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits.stances import carried
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FEET
 from motionloom.goals.goal import Goal
 from motionloom.kinematics import costs
-from motionloom.kinematics.feet import planted_feet
-from motionloom.kinematics.ik import LIMBS
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ together. A foot that stands does not turn with them: legs are moved so that it 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import smoothstep
+from motionloom.core.blending import smoothstep
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.models.prior import Prior
 from motionloom.edits.steering import Correction, product, standing
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT
 from motionloom.goals.goal import turn_between
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

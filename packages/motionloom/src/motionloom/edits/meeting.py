@@ -11,20 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import smoothstep
+from motionloom.core.blending import smoothstep
+from motionloom.core.features.pair import PairMotion, PlaceCode
+from motionloom.core.ground import GroundPose, relative, turned
+from motionloom.core.models.networks.pair import join, part
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion, heading
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits.apart import even, kept_apart, shift_apart
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import lacking
 from motionloom.edits.steering import toward
-from motionloom.features.pair import PairMotion, PlaceCode
 from motionloom.goals.contact import CHEST, RIGHT, Contact, Touch
 from motionloom.goals.goal import Goal, overlaid
-from motionloom.ground import GroundPose, relative, turned
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, closest
-from motionloom.motion import Motion, heading
-from motionloom.runtime.pair import join, part
-from motionloom.skeleton import SMPL22
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

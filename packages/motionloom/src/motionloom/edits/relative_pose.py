@@ -12,13 +12,13 @@ from typing import TypeAlias
 
 import numpy as np
 
-from motionloom.diffusion import row_noise, row_seed
-from motionloom.features.humanml import positions_at
-from motionloom.features.pair import PairMotion, on_the_spot
-from motionloom.ground import compose, relative
-from motionloom.runtime.pair import PLACE, PairSession, join, part, people
-from motionloom.runtime.prior_condition import Bound
-from motionloom.weights.prior import Prior
+from motionloom.core.diffusion import row_noise, row_seed
+from motionloom.core.features.humanml import positions_at
+from motionloom.core.features.pair import PairMotion, on_the_spot
+from motionloom.core.ground import compose, relative
+from motionloom.core.models.networks.pair import PLACE, PairSession, join, part, people
+from motionloom.core.models.networks.prior_condition import Bound
+from motionloom.core.models.prior import Prior
 
 SPACING = 40
 """Frames from anchor to anchor, at most."""

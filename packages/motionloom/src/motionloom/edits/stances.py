@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import smoothstep
+from motionloom.core.blending import smoothstep
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -14,18 +14,18 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.diffusion import Denoiser
+from motionloom.core.diffusion import Denoiser
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT, WIDTH
+from motionloom.core.ground import turned
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import heading
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits.stances import EASE, stilled
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.goals.goal import Goal, turn_between
-from motionloom.ground import turned
 from motionloom.kinematics import costs
 from motionloom.kinematics.gestures import airborne
-from motionloom.motion import heading
-from motionloom.skeleton import SMPL22
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import Adapted
 
@@ -12,8 +12,8 @@ MOST_ADAPTERS = specs(Adapted)["adapter"].many
 """Adapters that are merged at once."""
 
 Applied: TypeAlias = tuple[Any, float | None]
-"""An adapter (`motionloom.weights.adapter.Adapter`) or its file (`Path`), and its factor; None: 1, for those sentences
-alone that are like what it was taught (`motionloom.weights.prior.Prior.for_words`)."""
+"""An adapter (`core.models.adapter.Adapter`) or its file (`Path`), and its factor; None: 1, for those sentences alone
+that are like what it was taught (`core.models.prior.Prior.for_words`)."""
 
 
 def parse_adapter(word: str) -> tuple[Path, float | None]:

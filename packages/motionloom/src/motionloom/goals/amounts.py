@@ -11,13 +11,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from motionloom.core.motion import ground_pose
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.heads import head_said
 from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.paths import check_speed
 from motionloom.goals.verbs import TABLES, asserted, base_of, kind_of_verb, word_patterns
 from motionloom.kinematics.counts import Counted, Side, count, foot_moves
-from motionloom.motion import ground_pose
 
 _WORDS = word_patterns("amounts")
 

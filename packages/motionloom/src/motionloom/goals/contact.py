@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from motionloom.skeleton import SMPL22
+from motionloom.core.skeleton import SMPL22
 
 Turn = Literal["facing", "beside", "any"]
 LEFT, RIGHT, CHEST, HEAD = (SMPL22.index(name) for name in ("left_wrist", "right_wrist", "spine3", "head"))

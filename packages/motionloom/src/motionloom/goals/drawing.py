@@ -14,8 +14,8 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.io import text
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import text
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from motionloom.core.motion import heading
 from motionloom.goals.amounts import countable_actions
 from motionloom.goals.tumbling import FLAT, faces_up, log_roll, pitch
 from motionloom.goals.verbs import FALL_WAYS, asserted, base_of, in_plainer_words, kind_of_verb, word_patterns
@@ -42,7 +43,6 @@ from motionloom.kinematics.physics import (
     turn,
 )
 from motionloom.kinematics.stairs import FLIGHT
-from motionloom.motion import heading
 
 _WORDS = word_patterns("expected")
 

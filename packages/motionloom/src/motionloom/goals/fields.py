@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any, NoReturn
 
-from motionloom.errors import MotionloomError, kind_of, listed, meant, quoted
+from motionloom.core.errors import MotionloomError, kind_of, listed, meant, quoted
+from motionloom.core.files.text import shown
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, fail, read_lined
-from motionloom.io.text import shown
 from motionloom.requests.fields import Spec
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.ground import GroundPose
-from motionloom.motion import ground_pose
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import ground_pose
+from motionloom.core.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -11,22 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError, listed
-from motionloom.features.humanml import resample_positions
+from motionloom.core.errors import MotionloomError, listed
+from motionloom.core.features.humanml import resample_positions
+from motionloom.core.files.text import parse_json, read_text
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.drawing import read_drawing
 from motionloom.goals.fields import Field, value
 from motionloom.goals.goal import FPS, Goal, merged, start_of, turn_between
 from motionloom.goals.paths import WALKING, curve, lengths_along, root_path, through, turned_to
 from motionloom.goals.reach import check_reach
 from motionloom.goals.schemas import GOAL_JOINTS
-from motionloom.ground import GroundPose
 from motionloom.io import load
-from motionloom.io.text import parse_json, read_text
-from motionloom.motion import Motion, ground_pose
 from motionloom.requests import goal as keys
 from motionloom.requests.goal import FARTHEST, MAX_FRAMES
 from motionloom.retarget import to_smpl22
-from motionloom.skeleton import SMPL22
 
 __all__ = ["follow", "read_goal", "root_path"]
 

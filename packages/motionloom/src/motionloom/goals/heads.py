@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import smoothstep
-from motionloom.errors import MotionloomError
+from motionloom.core.blending import smoothstep
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.numerals import in_digits
 from motionloom.goals.verbs import asserted
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.motion import Motion
+from motionloom.core.motion import Motion
 
 
 @dataclass(frozen=True)

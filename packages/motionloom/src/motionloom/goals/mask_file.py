@@ -9,14 +9,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from motionloom.errors import MotionloomError, meant
+from motionloom.core.errors import MotionloomError, meant
+from motionloom.core.files.text import shown
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.fields import LinedFile
 from motionloom.goals.hold import FixedPart
 from motionloom.goals.schemas import MASK_JOINTS
 from motionloom.io.lined_yaml import Lined, read_lined
-from motionloom.io.text import shown
 from motionloom.requests.mask import MASK, MAX_FRAME, PART
-from motionloom.skeleton import SMPL22
 
 MAX_BYTES = 4_000_000
 BESIDE = 0.25

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import hermite
-from motionloom.errors import MotionloomError
+from motionloom.core.blending import hermite
+from motionloom.core.errors import MotionloomError
+from motionloom.core.ground import turned
 from motionloom.goals.goal import FPS, Goal, turn_between
-from motionloom.ground import turned
 from motionloom.requests.goal import CURVES
 
 Array = NDArray[np.float64]

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.paths import check_speed
-from motionloom.skeleton import SMPL22
 
 HIGHEST, LONGEST_REACH = 3.0, 1.3
 """Metres: no joint of a person gets higher above the floor, or further from the pelvis."""

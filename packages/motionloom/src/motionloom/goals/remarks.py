@@ -5,13 +5,13 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from motionloom.core.models.networks.text.known import Known, Nearest, bare, nearest, stem
+from motionloom.core.models.networks.text.protocol import TextEncoder
 from motionloom.goals.contact import read_contact
 from motionloom.goals.heads import is_of_head
 from motionloom.goals.roles import MARK, SEVERAL, prompts_of, tells_of_several, without_two
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import TABLES, in_plainer_words, rare_verb, subject_of, word_patterns
-from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
-from motionloom.runtime.text.protocol import TextEncoder
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import re
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.verbs import word_patterns
 
 _WORDS = word_patterns("roles")

@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.adapters import MOST_ADAPTERS
 from motionloom.io.lined_yaml import MAX_ITEMS
 from motionloom.requests import goal, mask
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.schema import Schema, schema
 from motionloom.requests.timeline import SegmentKeys, TimelineKeys
-from motionloom.skeleton import SMPL22
 
 GOAL_JOINTS = (*SMPL22.names, *SMPL22.groups)
 MASK_JOINTS = ("root", *SMPL22.groups, *SMPL22.names)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from motionloom.errors import MotionloomError, kind_of
+from motionloom.core.errors import MotionloomError, kind_of
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import FPS, Goal
 from motionloom.requests.sampling import LARGEST_GUIDANCE

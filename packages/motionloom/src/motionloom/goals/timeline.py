@@ -11,7 +11,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import plain_text
+from motionloom.core.reading import check_text
 from motionloom.formats import readable
 from motionloom.goals.adapters import MOST_ADAPTERS, parse_adapter
 from motionloom.goals.amounts import (
@@ -34,8 +36,6 @@ from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.goals.sequence import Part, lengths, split_actions, usual_seconds
 from motionloom.goals.verbs import in_plainer_words, subject_of
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
-from motionloom.io.text import plain_text
-from motionloom.reading import check_text
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
 from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys

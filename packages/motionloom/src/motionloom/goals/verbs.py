@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from motionloom.reading import read_table
+from motionloom.core.reading import read_table
 
 TABLES: dict[str, Any] = read_table("motionloom.goals", "verbs.toml")
 """What is known of words, by kind."""

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from motionloom import formats
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import check_place
+from motionloom.core.motion import Motion
 from motionloom.formats import Format
-from motionloom.io.atomic import check_place
-from motionloom.motion import Motion
 from motionloom.retarget.upright import set_upright
 
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")

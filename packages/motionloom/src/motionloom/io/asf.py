@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.io import text
-from motionloom.io.atomic import finished
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import text
+from motionloom.core.files.atomic import finished
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 AMC_FPS = 120.0

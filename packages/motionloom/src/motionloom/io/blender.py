@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from motionloom.errors import MotionloomError, one_line
-from motionloom.io.atomic import atomic_path
+from motionloom.core.errors import MotionloomError, one_line
+from motionloom.core.files.atomic import atomic_path
 
 VARIABLE = "MOTIONLOOM_BLENDER"
 """Environment variable with the place of Blender, or of a Python that can import bpy."""

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.io import text
-from motionloom.io.bvh_writer import SAME_PLACE, is_tip, moving_offsets, save_bvh
-from motionloom.motion import Motion
-from motionloom.skeleton import Poses, Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import text
+from motionloom.core.files.bvh_writer import SAME_PLACE, is_tip, moving_offsets, save_bvh
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Poses, Skeleton
 
 __all__ = ["Bvh", "guess_unit", "load_bvh", "read_bvh", "save_bvh"]
 

@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.ground import GroundPose
-from motionloom.io.atomic import atomic_path
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.files.text import unique_names
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion
 from motionloom.io.glb import Document, add_channel, entry_of, new_animation, pack_glb
 from motionloom.io.gltf_mesh import read_surfaces
 from motionloom.io.gltf_nodes import upwards
 from motionloom.io.gltf_read import read_rigs
 from motionloom.io.gltf_rig import Rig, on_floor, parents_first, worlds
-from motionloom.io.text import unique_names
-from motionloom.motion import Motion
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.joint_map import JointMap, Override
 from motionloom.retarget.joint_map import joint_map as find_joints

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.io.blender import fbx_to_glb, glb_to_fbx
 from motionloom.io.character import Character, load_character
 from motionloom.io.gltf import load_glb, save_glb
-from motionloom.motion import Motion
 from motionloom.retarget.joint_map import Override
 
 

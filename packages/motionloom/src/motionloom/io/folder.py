@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from motionloom.errors import MotionloomError
-from motionloom.interruption import held_back
-from motionloom.io.atomic import check_place, new_part
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import check_place, new_part
+from motionloom.core.interruption import held_back
 
 
 def check_folder(path: Path | str) -> Path:

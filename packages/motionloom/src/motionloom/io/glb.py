@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import plain_json, read_bytes, shown
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import plain_json, read_bytes, shown
 
 Array = NDArray[np.float64]
 MAX_NUMBERS = 400_000_000

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.io import body as bodies
-from motionloom.io.atomic import atomic_path
 from motionloom.io.body import MATERIALS, Piece, check_people
 from motionloom.io.glb import add_channel, entry_of, new_animation, pack_glb
 from motionloom.io.gltf_read import load_glb, load_glb_people
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
 
 __all__ = ["load_glb", "load_glb_people", "save_glb"]
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import hermite
+from motionloom.core import rotations as rot
+from motionloom.core.blending import hermite
+from motionloom.core.files.text import shown
 from motionloom.io.glb import Document
-from motionloom.io.text import shown
 
 Array = NDArray[np.float64]
 FREE_POSES = 2_000_000

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.io.glb import Document
 from motionloom.io.gltf_nodes import printable
 from motionloom.io.gltf_rig import Rig

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.io.glb import Document, read_document
 from motionloom.io.gltf_curves import channels_of, clock, declared_fps, read_curves
 from motionloom.io.gltf_nodes import Node, OpenedGlb, printable, read_nodes, read_parents, upwards
 from motionloom.io.gltf_rig import Rig, humanoid_nodes, posed, read_rig
-from motionloom.motion import Motion
 
 MAX_SKINS = 64
 

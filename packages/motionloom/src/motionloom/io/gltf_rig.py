@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.files.text import unique_names
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.glb import Document
 from motionloom.io.gltf_curves import Curves, sample
 from motionloom.io.gltf_nodes import OpenedGlb, transform, upwards
-from motionloom.io.text import unique_names
-from motionloom.motion import Motion
 from motionloom.retarget.named import joint_names
 from motionloom.retarget.names import parts_by_name
-from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 Matrices = dict[int, Array]

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.fidelity import compare
 from motionloom.retarget.transfer import joints22, to_smpl22
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.viz.figure import body_height, body_start
 
 Array = NDArray[np.float64]

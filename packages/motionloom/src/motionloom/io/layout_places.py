@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import Layout
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import Layout
+from motionloom.core.motion import Motion
 from motionloom.io import npz
 from motionloom.kinematics.layout_body import body_of_places, layout_skeleton
-from motionloom.motion import Motion
 
 ARRAYS = ("positions", "positions_3d", "joints", "arr_0")
 FARTHEST = 100.0

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from motionloom.errors import MotionloomError, kind_of
-from motionloom.io.text import read_text, shown
-from motionloom.reading import check_text
+from motionloom.core.errors import MotionloomError, kind_of
+from motionloom.core.files.text import read_text, shown
+from motionloom.core.reading import check_text
 
 MAX_DEPTH = 32
 MAX_ITEMS = 200_000
@@ -89,7 +89,7 @@ def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:
 
 
 def parse_lined(data: bytes, path: Path | str) -> Lined:
-    """The one document of YAML in plain text (`motionloom.io.text.plain_text`); ``path``: its file, or what it is."""
+    """The one document of YAML in plain text (`core.files.text.plain_text`); ``path``: its file, or what it is."""
     import yaml  # here, since commands that read no such file need not wait for it
 
     try:

@@ -21,13 +21,13 @@ from typing import BinaryIO, TypedDict, cast
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.io import text
-from motionloom.io.npz_writer import VERSION
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files import text
+from motionloom.core.files.npz_writer import VERSION
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Poses, Skeleton
 from motionloom.retarget.anatomy import HUMAN_LEGS
 from motionloom.retarget.upright import leg_length, set_upright, upright_places
-from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 MAX_JOINTS = 10_000
 _POSITIONS = ("positions", "joints", "motion", "arr_0")
@@ -321,7 +321,7 @@ def _from_positions(file: _Archive, fps: float | None, *, unit: float | None, up
         raise MotionloomError(f"{file.path} has positions but no 'fps' or no frames; give the frame rate")
     if np.abs(places).max() > 1e6:
         raise file.bad(f"'{name}' reaches {np.abs(places).max():g}; positions must be in metres")
-    from motionloom.kinematics.ik import motion_from_positions
+    from motionloom.core.body.ik import motion_from_positions
 
     places = places * (unit or 1.0)
     leg = leg_length(places)

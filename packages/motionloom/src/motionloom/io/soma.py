@@ -7,10 +7,10 @@ a T who faces +Z. J is 77, or 30 in older files; 22 are the joints of SMPL. The 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 

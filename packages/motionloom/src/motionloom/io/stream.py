@@ -15,12 +15,12 @@ from types import TracebackType
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.interruption import held_back
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.files.bvh_writer import GrowingBvh
+from motionloom.core.interruption import held_back
+from motionloom.core.motion import MAX_POSES, Motion
 from motionloom.io import check_output, save
-from motionloom.io.atomic import atomic_path
-from motionloom.io.bvh_writer import GrowingBvh
-from motionloom.motion import MAX_POSES, Motion
 
 MAX_BVH_FRAMES = 2_500_000
 """Of a person of 22 joints: a file of 1.8 GB, 34 hours; larger ones are read by nobody, not by this project either."""

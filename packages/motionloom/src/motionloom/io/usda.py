@@ -11,14 +11,14 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.files.text import unique_names
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.io.body import MATERIALS, body, check_people
 from motionloom.io.gltf_mesh import Surface
-from motionloom.io.text import unique_names
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 MAX_PATH = 10_000

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.io.atomic import atomic_path
+from motionloom.core import rotations as rot
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.io.glb import pack_glb
 from motionloom.io.gltf import glb_bytes
 from motionloom.io.gltf_rig import VRM_BONES
-from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
-from motionloom.skeleton import SMPL22, Skeleton
 
 _NEEDED = {"pelvis", "spine1", "head"} | {
     f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")

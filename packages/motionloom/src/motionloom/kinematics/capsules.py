@@ -5,7 +5,7 @@ Places are metres, +Y up, in one world.
 
 import numpy as np
 
-from motionloom.arrays import true_spans
+from motionloom.core.arrays import true_spans
 from motionloom.kinematics.physics import WRISTS, Array, J
 
 DEEP = 0.02

@@ -7,7 +7,7 @@ A name without a side, such as ``knee``, is for both sides. What solves for pose
 from collections.abc import Mapping
 from typing import TypeVar
 
-from motionloom.skeleton import SMPL22
+from motionloom.core.skeleton import SMPL22
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from motionloom.arrays import true_spans
+from motionloom.core.arrays import true_spans
 from motionloom.kinematics.gestures import (
     airborne,
     forward_bend,

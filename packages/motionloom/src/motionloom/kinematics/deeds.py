@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.kinematics.counts import count, foot_moves
 from motionloom.kinematics.gestures import (
     airborne,
@@ -22,7 +23,6 @@ from motionloom.kinematics.gestures import (
 )
 from motionloom.kinematics.physics import FEET, TOES, WRISTS, Array, displacement, floor_height, speed, travel
 from motionloom.kinematics.physics import turn as turned_by
-from motionloom.motion import Motion
 from motionloom.retarget import joints22
 
 RATE = 20.0

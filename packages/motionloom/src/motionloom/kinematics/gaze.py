@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.retarget.anatomy import read_body
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motionloom.arrays import true_spans
+from motionloom.core.arrays import true_spans
 from motionloom.kinematics.physics import ANKLES, FEET, TOES, WRISTS, Array, J, in_body, odd, smooth, velocity
 
 

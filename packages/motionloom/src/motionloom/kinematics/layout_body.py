@@ -8,11 +8,11 @@ motion with a rotation for every joint, which files of skeletons hold.
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import Layout, bone_lengths
-from motionloom.motion import Motion, local_rotations
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import Layout, bone_lengths
+from motionloom.core.motion import Motion, local_rotations
+from motionloom.core.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 OTHER_NAMES = {

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import ground
-from motionloom.motion import heading
-from motionloom.skeleton import SMPL22
+from motionloom.core import ground
+from motionloom.core.motion import heading
+from motionloom.core.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 J: dict[str, int] = {name: i for i, name in enumerate(SMPL22.names)}

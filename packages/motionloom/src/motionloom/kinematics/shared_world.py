@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.features import humanml
-from motionloom.features.layout import FPS
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import FPS
+from motionloom.core.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 

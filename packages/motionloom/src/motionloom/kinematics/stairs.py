@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionloom.arrays import true_spans
+from motionloom.core.arrays import true_spans
 from motionloom.kinematics.gestures import leg_length
 from motionloom.kinematics.physics import ANKLES, TOES, Array, smooth, velocity
 

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.body.feet import clean_feet, correction, planted_feet
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.features.layout import FEET
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.edits.boundary import JOIN, match_boundary, match_rotations
-from motionloom.features.layout import FEET
-from motionloom.kinematics.feet import clean_feet, correction, planted_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from motionloom.retarget.transfer import joints22, move_feet
-from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 

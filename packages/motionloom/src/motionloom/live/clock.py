@@ -19,7 +19,7 @@ from math import ceil
 from statistics import median_low
 from typing import Generic
 
-from motionloom.features.layout import FPS
+from motionloom.core.features.layout import FPS
 from motionloom.live.commands import Command, FrameCommand
 from motionloom.live.live import LOGGED, Frame, Frames, Mark, Stage
 from motionloom.tasks.watching import watching

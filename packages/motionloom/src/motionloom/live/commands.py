@@ -11,12 +11,12 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.paths import FASTEST
 from motionloom.goals.reach import HIGHEST
 from motionloom.requests.fields import Checked, Spec, declare
 from motionloom.requests.reading import read
-from motionloom.skeleton import SMPL22
 
 LONGEST_TEXT = 500
 """Characters of a prompt."""

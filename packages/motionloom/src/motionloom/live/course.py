@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import smoothstep
-from motionloom.features.layout import FPS
+from motionloom.core.blending import smoothstep
+from motionloom.core.features.layout import FPS
+from motionloom.core.ground import GroundPose
 from motionloom.goals.goal import Goal, turn_between
 from motionloom.goals.paths import WALKING, even, lengths_along
-from motionloom.ground import GroundPose
 from motionloom.live.commands import Path, Pose, Reach, Steer
 
 Array = NDArray[np.float64]

@@ -16,17 +16,17 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.live.commands import Command, FrameCommand
 from motionloom.live.person import Controls, Person, Request, State
 from motionloom.live.settings import Settings
 from motionloom.live.window import Noise, Sampler
-from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import Sampling
-from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

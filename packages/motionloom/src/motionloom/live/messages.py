@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import parse_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json
+from motionloom.core.skeleton import Skeleton
 from motionloom.live.clock import Health, first_of
 from motionloom.live.commands import FrameCommand, to_json
 from motionloom.live.live import Frame
 from motionloom.requests import reading
 from motionloom.requests.live import Hello
 from motionloom.retarget.named import named_skeleton
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 VERSION = 1

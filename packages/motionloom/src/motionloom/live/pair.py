@@ -8,23 +8,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motionloom.diffusion import row_seed
+from motionloom.core.diffusion import row_seed
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.ground import GroundPose, relative
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.edits.steering import Correction
-from motionloom.features.layout import FPS
-from motionloom.features.pair import PairMotion
 from motionloom.goals.roles import prompts_of
-from motionloom.ground import GroundPose, relative
 from motionloom.live.commands import Command, Say
 from motionloom.live.live import Frame, Stage, check
 from motionloom.live.person import Person, Request
 from motionloom.live.settings import Settings
 from motionloom.live.window import leaving
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
 from motionloom.tasks.pair import PairEdits, PairSampling, pair_features
 from motionloom.tasks.people import Duet, known_state
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 
 class LivePair(Stage[tuple[Frame, Frame]]):

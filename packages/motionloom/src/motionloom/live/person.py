@@ -11,13 +11,16 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.edits.heading import heading_for
 from motionloom.edits.steering import Correction, toward
-from motionloom.features.layout import FPS
-from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, overlaid, turn_between
 from motionloom.goals.paths import WALKING
-from motionloom.ground import GroundPose
 from motionloom.live.body import body, transfer
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, scaled
 from motionloom.live.course import (
@@ -34,10 +37,7 @@ from motionloom.live.course import (
     within_reach,
 )
 from motionloom.live.settings import Settings
-from motionloom.motion import Motion, ground_pose
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.long import last_frames
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.fields import LinedFile
 from motionloom.goals.roles import prompts_of
 from motionloom.io.lined_yaml import Lined, read_lined

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError, quoted
+from motionloom.core.errors import MotionloomError, quoted
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.live.clock import Player
 from motionloom.live.live import Frame, Live, motion_of
 from motionloom.live.messages import Hello
@@ -18,8 +20,6 @@ from motionloom.live.pair import LivePair
 from motionloom.live.settings import Settings
 from motionloom.robots.body import Robot
 from motionloom.robots.follow import Follower
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 MOST = 4

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.requests.fields import Checked, declare, like
 from motionloom.requests.live import Live
 from motionloom.requests.sampling import Sampling

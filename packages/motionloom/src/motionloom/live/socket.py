@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Protocol
 
-from motionloom.errors import MotionloomError, one_line
+from motionloom.core.errors import MotionloomError, one_line
 from motionloom.live import messages
 from motionloom.live.clock import Pace, first_of
 from motionloom.live.commands import from_json, person_of

@@ -9,18 +9,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motionloom.diffusion import Denoiser, NoiseSource, generator, guide, row_seed
+from motionloom.core.diffusion import Denoiser, NoiseSource, generator, guide, row_seed
+from motionloom.core.features import humanml
+from motionloom.core.methods.edit import Observed
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.prior_condition import Bound
+from motionloom.core.models.prior import Prior
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
-from motionloom.features import humanml
 from motionloom.live.settings import Settings
 from motionloom.requests.sampling import Sampling
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.long import zero_padded
-from motionloom.tasks.sampling import Batch, Observed, Rows, sample
+from motionloom.tasks.sampling import Batch, Rows, sample
 from motionloom.tasks.watching import View
-from motionloom.weights.prior import Prior
 
 TEXTS = 64
 """Prompts whose vectors are kept."""

@@ -12,8 +12,8 @@ from functools import cache
 from numbers import Real
 from typing import Any, NoReturn, TypedDict, Unpack
 
-from motionloom.errors import MotionloomError, kind_of, meant
-from motionloom.reading import check_text
+from motionloom.core.errors import MotionloomError, kind_of, meant
+from motionloom.core.reading import check_text
 
 _PARSERS: Mapping[str, Callable[[str], Any]] = {
     "whole": int,

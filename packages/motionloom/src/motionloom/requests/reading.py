@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from motionloom.errors import MotionloomError, listed, meant, quoted
+from motionloom.core.errors import MotionloomError, listed, meant, quoted
 from motionloom.requests.fields import Spec, specs
 
 R = TypeVar("R")

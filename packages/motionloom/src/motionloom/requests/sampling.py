@@ -5,24 +5,22 @@ from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypedDict
 
-from motionloom.errors import MotionloomError
+from motionloom.core.defaults import GUIDANCE, LARGEST_GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
+from motionloom.core.errors import MotionloomError
 from motionloom.requests.fields import Checked, declare, like
 
 if TYPE_CHECKING:
-    from motionloom.diffusion import Schedule
+    from motionloom.core.diffusion import Schedule
 
-STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
 LATE_GUIDANCE = 3.0
-"""How motions are sampled unless the request differs (docs/decisions/0008); the last is the factor of `rising`."""
+"""The factor of `rising`."""
 _FIRST_AND_THEN = 1 / 3, 4 / 3
 """Of two people: the factors of what guidance adds, where it is decided who stands where and behind that."""
 BATCH = 8
 """Rows in one network call."""
 SOLVERS = ("ddpm", "ddim", "dpm2m", "dpm2m-sde")
 SPACINGS = ("index", "early", "quadratic", "snr")
-"""Names in `motionloom.diffusion`, which is loaded with NumPy."""
-LARGEST_SEED = 2**62
-LARGEST_GUIDANCE = 100
+"""Names in `motionloom.core.diffusion`, which is loaded with NumPy."""
 Seed: TypeAlias = int | tuple[int, int]
 
 
@@ -110,7 +108,7 @@ class Sampling(Checked):
 
         Raises MotionloomError for more steps than there are levels.
         """
-        from motionloom.diffusion import levels
+        from motionloom.core.diffusion import levels
 
         if self.steps > schedule.steps:
             raise MotionloomError(f"{self.steps} steps cannot be taken; these weights take 1 to {schedule.steps}")
@@ -120,7 +118,7 @@ class Sampling(Checked):
 
     def strength(self, schedule: "Schedule", guidance: float | None = None) -> "Callable[[int], float]":
         """The guidance, or another one, by noise level: with early spacing it rises towards the end (`rising`)."""
-        from motionloom.diffusion import rising
+        from motionloom.core.diffusion import rising
 
         scale = self.guidance if guidance is None else guidance
         return rising(scale, schedule.steps, LATE_GUIDANCE if self.spacing == "early" else 1)

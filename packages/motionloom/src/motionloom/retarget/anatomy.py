@@ -22,9 +22,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Poses, Skeleton
 from motionloom.retarget.axes import (
     ARMS,
     CHEST,
@@ -47,7 +48,6 @@ from motionloom.retarget.axes import (
     unit,
 )
 from motionloom.retarget.joint_map import JointMap, Override, joint_map
-from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
 

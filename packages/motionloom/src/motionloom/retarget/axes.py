@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.arrays import unit as unit
-from motionloom.skeleton import SMPL22
+from motionloom.core import rotations as rot
+from motionloom.core.arrays import unit as unit
+from motionloom.core.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 

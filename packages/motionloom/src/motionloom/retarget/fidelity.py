@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.skeleton import SMPL22
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 

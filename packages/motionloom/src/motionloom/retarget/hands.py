@@ -12,12 +12,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.retarget.anatomy import Body, read_body
 from motionloom.retarget.joint_map import Override
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 HandPose = Literal["relaxed", "fist", "flat", "as-is"]

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.reading import read_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.reading import read_json
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget.names import Parts, parts_by_name, read_word
 from motionloom.retarget.topology import common_ancestor, is_above, parts_by_shape, path_down
-from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 Override = Mapping[str, str | Mapping[str, float]] | Path | str

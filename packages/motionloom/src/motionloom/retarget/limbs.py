@@ -8,10 +8,10 @@ shoulders go as far from rest as the source's (`shrug`), or hands where they wou
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
+from motionloom.core.skeleton import Skeleton
 from motionloom.retarget.anatomy import Body
 from motionloom.retarget.axes import ARM_JOINTS, CHEST, COLLARS, SHOULDERS, beside, unit
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 Limb = tuple[int, int, int]

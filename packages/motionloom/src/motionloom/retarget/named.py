@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.core.errors import MotionloomError
+from motionloom.core.skeleton import SMPL22, Skeleton
 
 # The names of pelvis, hip, spine1, knee, spine2, ankle, spine3, toe, neck, collar, head, shoulder, elbow, wrist; "{0}"
 # is the side as the pair behind "@" says it.

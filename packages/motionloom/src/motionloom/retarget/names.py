@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from motionloom.skeleton import Skeleton
+from motionloom.core.skeleton import Skeleton
 
 Parts = dict[str, int]
 """Body part, such as ``left_knee`` or ``pelvis``, to joint number."""

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.axes import FEET, TOES, mean_rotation
 from motionloom.retarget.transfer import joints22, retarget, to_smpl22
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 

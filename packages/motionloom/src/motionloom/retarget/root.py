@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from motionloom.motion import Motion
+from motionloom.core.motion import Motion
 from motionloom.retarget.anatomy import Body
 
 RootMode = Literal["motion", "hips", "in-place"]

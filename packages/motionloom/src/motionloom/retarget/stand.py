@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from motionloom import rotations as rot
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion, ground_pose
+from motionloom.core import rotations as rot
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import Skeleton
 from motionloom.retarget.anatomy import Body, read_body
-from motionloom.skeleton import Skeleton
 
 HERE = GroundPose()
 """At the origin, facing +Z: where most characters stand."""

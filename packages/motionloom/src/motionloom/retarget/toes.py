@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
 from motionloom.retarget.anatomy import FEET, TOES, Body
 
 Array = NDArray[np.float64]

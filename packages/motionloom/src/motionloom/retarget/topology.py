@@ -5,8 +5,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.core.skeleton import Skeleton
 from motionloom.retarget.names import Parts
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 _Pair = tuple[list[int], list[int]]

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
-from motionloom.motion import Motion, local_rotations
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.motion import Motion, local_rotations
+from motionloom.core.skeleton import SMPL22, Poses, Skeleton
 from motionloom.retarget.anatomy import Body, read_body
 from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, LEG_JOINTS, SPINE, TOES, beside, trunk, unit
 from motionloom.retarget.floor import Stance, read_stance
@@ -22,7 +23,6 @@ from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.limbs import aim, bend_limb, placed, reach, read_shrug, shrug
 from motionloom.retarget.root import RootMode, place_root
 from motionloom.retarget.upright import up_of
-from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
 _LEG = 0.82

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Poses
 from motionloom.retarget.anatomy import Body, read_body
 from motionloom.retarget.axes import FEET, HEAD, unit
 from motionloom.retarget.joint_map import Override
-from motionloom.skeleton import Poses
 
 Array = NDArray[np.float64]
 

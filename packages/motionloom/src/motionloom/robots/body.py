@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget.anatomy import read_body
 from motionloom.robots.engine import load_mujoco, posed
 from motionloom.robots.joints import LEG, SIDES, Parts, find_parts, limb_points
 from motionloom.robots.model import Hinge, Model, check_limits, read_model
-from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 LEGS_M = (0.08, 1.6)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.kinematics.feet import envelope
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.body.feet import envelope
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
 from motionloom.retarget.joint_map import Override
 from motionloom.robots.body import Robot
 from motionloom.robots.engine import load_mujoco

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.arrays import true_spans
-from motionloom.blending import smoothstep
-from motionloom.kinematics.feet import bridge
+from motionloom.core import rotations as rot
+from motionloom.core.arrays import true_spans
+from motionloom.core.blending import smoothstep
+from motionloom.core.body.feet import bridge
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

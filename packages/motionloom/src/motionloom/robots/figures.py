@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
 from motionloom.robots.body import Robot, to_motion, to_mujoco, turns_to_mujoco
 from motionloom.robots.clip import Clip
 from motionloom.robots.engine import load_mujoco

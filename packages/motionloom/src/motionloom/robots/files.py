@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
+from motionloom.core.reading import read_bytes
 from motionloom.io.npz import read_arrays
-from motionloom.motion import Motion
-from motionloom.reading import read_bytes
 from motionloom.robots.body import Robot, read_robot, to_motion
 from motionloom.robots.clip import FPS, Clip, velocities
 from motionloom.robots.figures import planted_soles

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from motionloom import rotations as rot
-from motionloom.io.atomic import atomic_path
+from motionloom.core import rotations as rot
+from motionloom.core.files.atomic import atomic_path
 from motionloom.robots.body import Robot, read_robot, to_motion, to_mujoco
 from motionloom.robots.engine import load_mujoco
 from motionloom.viz.film import film_rate, film_size, write_film

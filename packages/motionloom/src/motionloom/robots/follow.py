@@ -7,9 +7,9 @@ sole levels and stays, and the correction fades when it leaves. Speeds are kept 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.motion import Motion
 from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
 from motionloom.robots.clip import check_settings
 from motionloom.robots.feet import EASE, ROLLING, angles, heel_and_toes, lowest, orient

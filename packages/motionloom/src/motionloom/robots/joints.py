@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.reading import read_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.reading import read_json
 from motionloom.retarget.names import tokens_of
 from motionloom.robots.engine import posed
 from motionloom.robots.model import Hinge, Model

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError, one_line
-from motionloom.reading import read_bytes
+from motionloom.core.errors import MotionloomError, one_line
+from motionloom.core.reading import read_bytes
 from motionloom.robots.engine import load_mujoco, posed
 from motionloom.robots.trial import try_model
 

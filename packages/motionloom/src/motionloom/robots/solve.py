@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
+from motionloom.core import rotations as rot
 from motionloom.robots.body import Robot
 from motionloom.robots.engine import load_mujoco, posed
 from motionloom.robots.joints import SIDES

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.kinematics.feet import envelope, planted_feet
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.body.feet import envelope, planted_feet
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import retarget, to_smpl22
 from motionloom.retarget.joint_map import Override
 from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
 from motionloom.robots.feet import plant
 from motionloom.robots.joints import SIDES
-from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -13,7 +13,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.robots.engine import load_mujoco
 
 SECONDS, PROCESSOR_SECONDS = 60.0, 10

@@ -18,9 +18,10 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
-from motionloom.errors import MotionloomError, listed, meant, quoted
-from motionloom.io.text import parse_json
-from motionloom.reading import check_text
+from motionloom.core.errors import MotionloomError, listed, meant, quoted
+from motionloom.core.files.text import parse_json
+from motionloom.core.reading import check_text
+from motionloom.core.skeleton import SMPL22
 from motionloom.requests.export import FORMATS, Export
 from motionloom.requests.fields import specs
 from motionloom.requests.reading import parse_fields, read
@@ -41,7 +42,6 @@ from motionloom.server.saved import Saved
 from motionloom.server.saved import routes as project_routes
 from motionloom.server.timelines import sentence_json, timeline_json, timeline_yaml
 from motionloom.server.worker import Worker
-from motionloom.skeleton import SMPL22
 
 
 @dataclass(eq=False)

@@ -15,9 +15,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
-from motionloom.errors import MotionloomError, listed, meant, quoted
+from motionloom.core.errors import MotionloomError, listed, meant, quoted
+from motionloom.core.reading import check_texts
 from motionloom.goals.adapters import Applied
-from motionloom.reading import check_texts
 from motionloom.requests.export import Export
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.reading import narrow_fields, read

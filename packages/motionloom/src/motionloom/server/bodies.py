@@ -14,8 +14,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response, StreamingResponse
 
-from motionloom.io.text import shown
-from motionloom.reading import check_text
+from motionloom.core.files.text import shown
+from motionloom.core.reading import check_text
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal

@@ -5,18 +5,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.formats import characters
 from motionloom.io.bvh import read_bvh
 from motionloom.io.character import Character, load_character
 from motionloom.io.gltf_read import read_rigs
-from motionloom.io.text import parse_json
 from motionloom.retarget import joint_map
 from motionloom.retarget.names import parts_by_name
 from motionloom.retarget.topology import parts_by_shape
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
-from motionloom.skeleton import SMPL22, Skeleton
 
 SUFFIXES = (*characters(alone=True), ".bvh")
 Named = Mapping[str, str]

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion, ground_pose
 from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.remarks import Remark, numbers_read, parts_read
 from motionloom.io import load
-from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.server.job_request import JobRequest
 from motionloom.tasks import run as tasks

@@ -7,14 +7,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.formats import readable
 from motionloom.goals.fields import Field
 from motionloom.io import load, load_scene, save, save_scene
-from motionloom.io.text import parse_json
 from motionloom.kinematics.deeds import happened
 from motionloom.kinematics.gaze import looks
-from motionloom.motion import Motion
 from motionloom.requests.export import Export
 from motionloom.retarget import RootMode, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
@@ -26,7 +27,6 @@ from motionloom.server.characters import loaded
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.viz.page import Take, write_page
 
 FORMATS = {

@@ -17,9 +17,9 @@ from typing import IO, TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from motionloom.errors import MotionloomError, one_line
+from motionloom.core.errors import MotionloomError, one_line
+from motionloom.core.files.text import parse_json
 from motionloom.goals.fields import Field
-from motionloom.io.text import parse_json
 from motionloom.server.bodies import PIECE
 from motionloom.server.refusal import full_disk
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from motionloom.errors import MotionloomError, listed, meant, quoted
+from motionloom.core.errors import MotionloomError, listed, meant, quoted
 from motionloom.goals.adapters import Applied, parse_adapter
 from motionloom.goals.fields import Field
 from motionloom.goals.sequence import usual_seconds
@@ -22,8 +22,8 @@ from motionloom.server.project import Project, Stored
 from motionloom.server.timelines import timeline_from_json
 
 if TYPE_CHECKING:
+    from motionloom.core.motion import Motion
     from motionloom.goals.goal import Goal
-    from motionloom.motion import Motion
     from motionloom.tasks.redraw import Block
 
 TASKS = tuple(REQUESTS)

@@ -28,13 +28,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.files.npz_writer import save_npz
+from motionloom.core.files.text import stored_json
+from motionloom.core.motion import Motion
 from motionloom.formats import characters
-from motionloom.io.atomic import atomic_path
 from motionloom.io.npz import load_npz
-from motionloom.io.npz_writer import save_npz
-from motionloom.io.text import stored_json
-from motionloom.motion import Motion
 from motionloom.server.limits import Limits
 from motionloom.server.refusal import Refusal
 from motionloom.server.shelf import Shelf

@@ -21,8 +21,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import parse_json, stored_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json, stored_json
 from motionloom.server.bodies import body_of, session_of
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal

@@ -17,7 +17,7 @@ import websockets  # noqa: F401  uvicorn does without, and answers live sessions
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.adapters import Applied
 from motionloom.server import page
 from motionloom.server.app import build
@@ -30,9 +30,9 @@ from motionloom.server.refusal import Refusal
 from motionloom.server.worker import Worker
 
 if TYPE_CHECKING:
+    from motionloom.core.models.prior import Prior
     from motionloom.live.sessions import Sessions
     from motionloom.robots.body import Robot
-    from motionloom.weights.prior import Prior
 
 
 @dataclass(frozen=True)

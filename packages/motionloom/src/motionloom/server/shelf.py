@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
-from motionloom.io.text import stored_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.files.text import stored_json
 from motionloom.server.refusal import Refusal
 
 MOST = 500

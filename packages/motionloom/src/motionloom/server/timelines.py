@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.timeline import Timeline, timeline_from, timeline_of, timeline_of_yaml
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.goals.adapters import Applied
 from motionloom.server.jobs import Job
 from motionloom.server.limits import Limits
@@ -16,9 +16,9 @@ from motionloom.server.queue import Queue
 from motionloom.server.refusal import Refusal, full_disk
 
 if TYPE_CHECKING:
+    from motionloom.core.models.prior import Prior
     from motionloom.tasks.run import Models, Result
     from motionloom.tasks.watching import Denoised
-    from motionloom.weights.prior import Prior
 
 log = logging.getLogger("motionloom.server")
 ROWS = 8

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.adapter import Adapter
+from motionloom.core.models.prior import Prior
 from motionloom.goals.adapters import MOST_ADAPTERS, Applied
-from motionloom.weights.adapter import Adapter
-from motionloom.weights.prior import Prior
 
 CACHE_SIZE = 4
 """Sets of adapters whose merged networks are cached; each is as large as the prior's network."""

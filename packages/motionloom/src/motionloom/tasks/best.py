@@ -12,11 +12,11 @@ from typing import Protocol
 
 import numpy as np
 
-from motionloom.diffusion import row_noise, row_seed
-from motionloom.features import humanml
-from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.core.diffusion import row_noise, row_seed
+from motionloom.core.features import humanml
+from motionloom.core.features.layout import LAYOUT, WIDTH
+from motionloom.core.models.prior import Prior
 from motionloom.kinematics.wholeness import ENOUGH, wholeness
-from motionloom.weights.prior import Prior
 
 STILL_SHARE = 0.8
 """Share of the middle candidate's pace below which another one counts as standing still."""

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import shares, smoothstep
+from motionloom.core import rotations as rot
+from motionloom.core.blending import shares, smoothstep
+from motionloom.core.body.feet import clean_feet
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.motion import Motion
 from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal, joined
-from motionloom.kinematics.feet import clean_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
 
 Array = NDArray[np.float64]
 

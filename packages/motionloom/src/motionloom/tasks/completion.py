@@ -1,6 +1,6 @@
 """Completing windows of motion of which something is known: the past, an end, some joints (`Predictor`).
 
-The published way (`lab.papers.humanmac`) mixes the known frames into the noisy state and stops one level short of
+The published way (`core.methods.humanmac`) mixes the known frames into the noisy state and stops one level short of
 clean. Here what is known is a condition of the network, sampling ends clean, and what is known is written back exactly;
 the rest meets it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
@@ -13,19 +13,19 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.blending import quintic_decay, smoothstep
-from motionloom.diffusion import SOLVERS, Constraint, NoiseSource, guide, observe, row_noise, row_seed, sample
-from motionloom.diffusion.sampling import Snapshot
+from motionloom.core.blending import quintic_decay, smoothstep
+from motionloom.core.body.feet import envelope
+from motionloom.core.diffusion import SOLVERS, Constraint, NoiseSource, guide, observe, row_noise, row_seed, sample
+from motionloom.core.diffusion.sampling import Snapshot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.positions import SMPL_LAYOUT, Layout, Place, with_bones
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.motion import Motion
 from motionloom.edits.boundary import match_boundary
-from motionloom.errors import MotionloomError
-from motionloom.features.positions import SMPL_LAYOUT, Layout, Place, with_bones
-from motionloom.kinematics.feet import envelope
-from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
 from motionloom.tasks.best import Rank, candidate_seeds, index_of_smallest, liveliness_ranks
 from motionloom.tasks.splice import person_at
 from motionloom.tasks.watching import View
-from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 

@@ -11,24 +11,24 @@ from typing import Literal, Unpack
 
 import numpy as np
 
-from motionloom.diffusion import Denoiser, Weight, blend, guide, mix
+from motionloom.core.diffusion import Denoiser, Weight, mix
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import mask as named
+from motionloom.core.features.layout import ric
+from motionloom.core.methods.blending import blended
+from motionloom.core.models.adapter import Adapter, adapted
+from motionloom.core.models.adapter import adapters as shipped
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.edits import fitting
 from motionloom.edits.steering import Correction, corrected, toward
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import mask as named
-from motionloom.features.layout import ric
 from motionloom.goals.goal import Goal, start_of
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.prior_condition import Condition
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Batch, Progress, Rows, sample, strength
 from motionloom.tasks.text import check_goal_length, check_prompts, single_person_view, to_motion
-from motionloom.weights.adapter import Adapter, adapted
-from motionloom.weights.adapter import adapters as shipped
-from motionloom.weights.prior import Prior
 
 Weighted = tuple[Adapter, Weight]
 Adapters = Literal["none", "fitting"] | Sequence[Adapter | Weighted]
@@ -166,24 +166,6 @@ def steered_features(
 
 def _adapted_nets(adapters: Sequence[Weighted], net: PriorSession) -> list[PriorSession]:
     return [adapted(net, adapter) for adapter, _ in adapters]
-
-
-def blended(
-    nets: Sequence[PriorSession],
-    cond: Condition,
-    known: np.ndarray,
-    mask: np.ndarray,
-    *,
-    weights: Sequence[Weight],
-    guidance: Weight,
-) -> Denoiser:
-    """DiffusionBlending: networks guided by themselves, then their weighted sum; conditioned where they can be."""
-    null = cond.null()
-    guided = [
-        guide(net, net.show(net.bind(cond), known, mask), net.show(net.bind(null), known, mask), guidance)
-        for net in nets
-    ]
-    return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 
 def goal_feature_mask(goal: Goal) -> np.ndarray:

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.body.feet import clean_feet, planted_feet
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.heads import HeadMove
-from motionloom.kinematics.feet import clean_feet, planted_feet
 from motionloom.kinematics.gaze import looking, turned
-from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.onto import onto, place_of, with_place
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.splice import KeptParts, ground_pose_at, kept_parts, move_on_floor, splice
 
 Span = tuple[float, float]

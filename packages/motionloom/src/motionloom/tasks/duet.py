@@ -15,20 +15,22 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.networks.pair import PLACE, PairSession, join, part
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.edits.meeting import Bodies, Meeting
 from motionloom.edits.relative_pose import PoseGuidance, relative_pose_guidance
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
-from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal
 from motionloom.goals.roles import prompts_of
 from motionloom.goals.segment import Segment
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
 from motionloom.requests.sampling import PairSampling, PairSettings
-from motionloom.runtime.pair import PLACE, PairSession, join, part
-from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.body import solve_stream
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.long import (
@@ -53,8 +55,6 @@ from motionloom.tasks.people import Duet, Partner
 from motionloom.tasks.sampling import Moves, Progress, sample_chain
 from motionloom.tasks.splice import concatenate
 from motionloom.tasks.watching import ChainView
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

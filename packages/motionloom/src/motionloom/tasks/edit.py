@@ -11,14 +11,16 @@ from typing import Literal, TypeAlias, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.diffusion import Denoiser
+from motionloom.core.diffusion import Denoiser
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import layout
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.methods.edit import Observed
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.edits.boundary import InpaintWindow, arrival, joining
-from motionloom.errors import MotionloomError
-from motionloom.features import layout
-from motionloom.features.layout import FPS, WIDTH
-from motionloom.features.placed import PlacedMotion
 from motionloom.goals.heads import read_head
-from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.requests.shared import LONGEST
@@ -37,7 +39,7 @@ from motionloom.tasks.direct_edits import (
     joints_of,
     kept_parts_of,
 )
-from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
+from motionloom.tasks.sampling import Batch, Progress, Rows, sample
 from motionloom.tasks.splice import (
     apply_sample,
     concatenate,
@@ -48,7 +50,6 @@ from motionloom.tasks.splice import (
 )
 from motionloom.tasks.text import check_humanml
 from motionloom.tasks.watching import View
-from motionloom.weights.prior import Prior
 
 WINDOW = 8.0
 """Seconds that the network sees of a clip around a short stretch, the stretch included."""

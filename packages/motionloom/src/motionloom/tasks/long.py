@@ -5,7 +5,7 @@ side, and neighbours agree on what they share at every level (`diffusion.stagger
 knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
 together, and a moving window of frames becomes positions and a body.
 
-The published procedure is in `lab.papers.double_take`; docs/decisions/0013 compares them.
+The published procedure is in `core.methods.double_take`; docs/decisions/0013 compares them.
 """
 
 from collections import deque
@@ -18,20 +18,21 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.diffusion import lerp
+from motionloom.core.diffusion import lerp
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.prior_condition import Bound
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
-from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.adapting import adapted_priors, load_adapters
 from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.choosing import best_in_words
@@ -39,7 +40,6 @@ from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
 from motionloom.tasks.splice import concatenate, person_at_20
 from motionloom.tasks.text import check_humanml, placed_positions
 from motionloom.tasks.watching import ChainView
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

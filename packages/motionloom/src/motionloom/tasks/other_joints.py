@@ -11,18 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.features.humanml import positions_at
-from motionloom.features.positions import SMPL_LAYOUT
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.humanml import positions_at
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.goals.hold import FixedJoints
 from motionloom.kinematics.layout_body import body_of_places, layout_skeleton, places_on_layout, smpl_joints
-from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling
-from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.completion import Known, WindowSampler, window_count
 from motionloom.tasks.splice import concatenate, move_rigidly, person_at
-from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 

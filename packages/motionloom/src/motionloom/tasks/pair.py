@@ -11,29 +11,31 @@ from typing import Unpack
 
 import numpy as np
 
-from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
+from motionloom.core.diffusion import Denoiser, row_seed
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.methods.com_mdm import pair_noise
+from motionloom.core.methods.edit import Observed
+from motionloom.core.models.networks.pair import PairSession, people
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.edits.fitting import fit
 from motionloom.edits.meeting import Bodies, Meeting, met
 from motionloom.edits.relative_pose import relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
-from motionloom.features.pair import PairMotion
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.roles import prompts_of
-from motionloom.ground import GroundPose
 from motionloom.requests.sampling import PairSampling, PairSettings, Seed
 from motionloom.requests.shared import LONGEST
-from motionloom.runtime.pair import PairSession, people
 from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.long import holding_correction
 from motionloom.tasks.people import Duet, PairPast, finish_person, known_state
-from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample
+from motionloom.tasks.sampling import Batch, Progress, Rows, sample
 from motionloom.tasks.text import check_goal_length, check_humanml, frames_in
 from motionloom.tasks.watching import View
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 Prompt = str | tuple[str, str]
 
@@ -152,12 +154,6 @@ class _PairEdit:
             return np.where(mask, clean, np.concatenate(bodies_edited))
 
         return changed
-
-
-def pair_noise(seeds: Sequence[int]) -> NoiseSource:
-    """Noise of rows' own seeds; a motion gets the noise it has where nobody else is there, the slot before it other."""
-    places, motion = row_noise([row_seed(seed, 0, 1) for seed in seeds]), row_noise(seeds)
-    return lambda like: np.concatenate([places(like[:, :1]), motion(like[:, 1:])], axis=1)
 
 
 def person_seeds(seed: Seed, number: int) -> tuple[int, int]:

@@ -9,23 +9,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
-from motionloom.features import pair as two
-from motionloom.features.humanml import positions_at
-from motionloom.features.layout import FPS, LAYOUT
-from motionloom.features.pair import PairMotion
-from motionloom.ground import GroundPose
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import pair as two
+from motionloom.core.features.humanml import positions_at
+from motionloom.core.features.layout import FPS, LAYOUT
+from motionloom.core.features.pair import PairMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.methods.edit import Observed
+from motionloom.core.models.networks.pair import PairSession
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.kinematics.shared_world import one_world, together
-from motionloom.motion import Motion
 from motionloom.requests.shared import LONGEST
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
-from motionloom.runtime.pair import PairSession
-from motionloom.skeleton import SMPL22
-from motionloom.tasks.sampling import Observed
 from motionloom.tasks.splice import apply_positions, concatenate, continue_motion, person_at, person_at_20
 from motionloom.tasks.text import finish
-from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 Duet = tuple[Motion, Motion]

@@ -14,19 +14,20 @@ from typing import Literal, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
-from motionloom.errors import MotionloomError
-from motionloom.features.humanml import positions_at
-from motionloom.features.positions import SMPL_LAYOUT
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.humanml import positions_at
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.goals.mask_file import fixes_everything
 from motionloom.goals.schemas import MASK_JOINTS
-from motionloom.motion import Motion
 from motionloom.requests.sampling import PredictionSampling, PredictionSettings
 from motionloom.requests.tasks import DAY
 from motionloom.retarget import to_smpl22
-from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import CONTEXT, FUTURES, Known, Past, WindowSampler, window_count
 from motionloom.tasks.other_joints import arrive, future_pieces, on_joints_of, sees_person
 from motionloom.tasks.sampling import Progress
@@ -40,7 +41,6 @@ from motionloom.tasks.splice import (
     overlay,
     splice,
 )
-from motionloom.weights.predictor import Predictor
 
 __all__ = ["FixedJoints", "FixedPart", "predict", "predict_pieces", "switch"]
 

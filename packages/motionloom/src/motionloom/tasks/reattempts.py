@@ -9,12 +9,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 
-from motionloom.diffusion.sampling import row_seed
+from motionloom.core.diffusion.sampling import row_seed
+from motionloom.core.motion import Motion
 from motionloom.goals.expected import FLOOR, missing
 from motionloom.goals.remarks import Remark, clipped, replacement_line
 from motionloom.goals.segment import Segment
 from motionloom.goals.verbs import in_plainer_words
-from motionloom.motion import Motion
 from motionloom.requests.sampling import LARGEST_SEED
 from motionloom.tasks.long import compose
 from motionloom.tasks.redraw import Run, Timed, resample_runs

@@ -18,20 +18,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from motionloom.core.body.feet import clean_feet
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.features.layout import LAYOUT
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion, ground_pose
 from motionloom.edits.fitting import fit
-from motionloom.features.layout import LAYOUT
-from motionloom.features.placed import PlacedMotion
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
-from motionloom.kinematics.feet import clean_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion, ground_pose
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.body import Places, join_places
 from motionloom.tasks.long import LOOK_BACK, Past, Track, long_features, place_pieces, segments_on
 from motionloom.tasks.sampling import Moves
 from motionloom.tasks.splice import concatenate, move_on_floor, splice
-from motionloom.weights.prior import Prior
 
 
 class Block(NamedTuple):

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.prior import Prior
 from motionloom.goals.remarks import Remark, remarks_on, remarks_on_two
 from motionloom.goals.roles import prompts_of
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior
 
 
 def remarks_on_words(

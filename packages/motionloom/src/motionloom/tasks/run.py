@@ -12,7 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.features.layout import WIDTH
+from motionloom.core.features.layout import WIDTH
+from motionloom.core.models.pair import PairBlock
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.adapters import Applied
 from motionloom.goals.expected import climbs
 from motionloom.goals.goal import Goal
@@ -20,19 +25,14 @@ from motionloom.goals.hold import FixedJoints
 from motionloom.goals.remarks import Remark
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import Timeline, single_segment, with_goals_read
-from motionloom.motion import Motion
 from motionloom.requests.sampling import BATCH
 from motionloom.retarget import joints22
-from motionloom.skeleton import SMPL22
 from motionloom.tasks import control, duet, edit, long, pair, predict, reattempts, redraw, text, worded
 from motionloom.tasks.adapting import adapt, adapted_priors
 from motionloom.tasks.sampling import Moves, Progress
 from motionloom.tasks.supported import add_support, add_support_between, is_elevated, lowered, remarks_on_air
 from motionloom.tasks.unplaced import compose_unplaced
 from motionloom.tasks.watching import watching
-from motionloom.weights.pair import PairBlock
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Prior
 
 
 @dataclass(eq=False)

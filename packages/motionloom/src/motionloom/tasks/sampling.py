@@ -10,7 +10,7 @@ from typing import Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
 
-from motionloom.diffusion import (
+from motionloom.core.diffusion import (
     SOLVERS,
     Constraint,
     Denoiser,
@@ -25,14 +25,15 @@ from motionloom.diffusion import (
     row_noise,
     staggered,
 )
-from motionloom.diffusion import sample as denoising
+from motionloom.core.diffusion import sample as denoising
+from motionloom.core.methods.edit import Observed
+from motionloom.core.models.networks.pair import PairSession
+from motionloom.core.models.networks.prior import PriorSession
+from motionloom.core.models.networks.prior_condition import Condition
+from motionloom.core.models.prior import Prior
 from motionloom.requests.sampling import Sampling
-from motionloom.runtime.pair import PairSession
-from motionloom.runtime.prior import PriorSession
-from motionloom.runtime.prior_condition import Condition
 from motionloom.tasks.best import Chooser, best_candidate, candidate_seeds
 from motionloom.tasks.watching import ChainView, LatestEstimates, View
-from motionloom.weights.prior import Prior
 
 Progress = Callable[[int, int], None]
 """(network calls done, network calls in all)."""
@@ -85,25 +86,6 @@ class Batch:
 Network: TypeAlias = PriorSession | PairSession
 Edit: TypeAlias = Callable[[Denoiser, Batch], Denoiser]
 """Changes the guided denoiser of a batch."""
-
-
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Known part of the states (inpainting)."""
-
-    values: np.ndarray
-    """(rows, tokens, features), standardised; read where the mask is True."""
-    mask: np.ndarray
-    """The same shape, bool."""
-    noise_free: bool = False
-    """The network sees the known part without noise (Shafir et al. 2024, section 3.3), else at the noise of its level
-    (RePaint, Lugmayr et al. 2022)."""
-    strength: float = 1.0
-    """Share of the noise levels that the values are taken to, and sampled back from (SDEdit, Meng et al. 2022)."""
-
-    def of(self, rows: Sequence[int]) -> "Observed":
-        """Those of some rows."""
-        return replace(self, values=self.values[rows], mask=self.mask[rows])
 
 
 def sample(

@@ -9,20 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.blending import smoothstep
+from motionloom.core import rotations as rot
+from motionloom.core.blending import smoothstep
+from motionloom.core.body.feet import clean_feet
+from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.features.humanml import positions_at, resample_positions
+from motionloom.core.features.layout import FPS
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from motionloom.edits.boundary import match_boundary, match_rotations
-from motionloom.features.humanml import positions_at, resample_positions
-from motionloom.features.layout import FPS
-from motionloom.features.placed import PlacedMotion
-from motionloom.ground import GroundPose
-from motionloom.kinematics.feet import clean_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.onto import match_root, onto, place_of, with_place
-from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from motionloom.core.body.feet import clean_feet
+from motionloom.core.motion import Motion
 from motionloom.edits.fitting import fit
 from motionloom.goals.expected import climbs, floating
 from motionloom.goals.goal import Goal
-from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.physics import ANKLES, WRISTS, J, odd, smooth
 from motionloom.kinematics.stairs import UP, falls_from_above, hovering, in_the_air
 from motionloom.kinematics.stairs import stairs as find_stairs
-from motionloom.motion import Motion
 from motionloom.retarget import joints22
 
 _JUMP = re.compile(r"\b(?:jump|hop|leap)\w*")

@@ -9,15 +9,16 @@ from typing import Unpack
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features import babel, humanml
-from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.features.placed import PlacedMotion
+from motionloom.core.body.feet import clean_feet
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features import babel, humanml
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.features.placed import PlacedMotion
+from motionloom.core.ground import GroundPose
+from motionloom.core.methods.text import to_motion as to_motion
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.goal import Goal
-from motionloom.ground import GroundPose
-from motionloom.kinematics.feet import clean_feet
-from motionloom.kinematics.ik import motion_from_positions
-from motionloom.motion import Motion
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import GUIDANCE as GUIDANCE
 from motionloom.requests.sampling import LARGEST_SEED, Sampling, Settings
@@ -29,7 +30,6 @@ from motionloom.tasks.choosing import best_in_words
 from motionloom.tasks.sampling import Progress, Rows, sample
 from motionloom.tasks.supported import add_support
 from motionloom.tasks.watching import View
-from motionloom.weights.prior import Prior
 
 
 def sample_features(
@@ -164,12 +164,6 @@ def placed_positions(prior: Prior, features: np.ndarray, place: GroundPose) -> n
     if features.shape[1] == WIDTH:
         return PlacedMotion(features, place).positions
     return finish(prior, features, foot_lock=False).positions()
-
-
-def to_motion(features: np.ndarray, fps: float, *, foot_lock: bool = True) -> Motion:
-    """Features (frames, 263) to a person with constant bones; with ``foot_lock`` the planted feet hold still."""
-    motion = motion_from_positions(humanml.decode_positions(features), fps)
-    return clean_feet(motion, contacts=features[:, LAYOUT["contacts"]]) if foot_lock else motion
 
 
 def check_features(prior: Prior) -> None:

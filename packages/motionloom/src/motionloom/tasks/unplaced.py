@@ -6,13 +6,13 @@ from typing import Unpack
 
 import numpy as np
 
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals.segment import Segment
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling, Settings
 from motionloom.tasks.long import long_features
 from motionloom.tasks.sampling import Moves
 from motionloom.tasks.text import check_features, check_humanml, finish
-from motionloom.weights.prior import Prior
 
 
 def compose_unplaced(

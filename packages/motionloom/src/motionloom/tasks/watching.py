@@ -21,7 +21,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.diffusion.sampling import Snapshot
+from motionloom.core.diffusion.sampling import Snapshot
 
 Array = NDArray[np.float64]
 

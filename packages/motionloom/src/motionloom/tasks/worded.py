@@ -18,8 +18,10 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FPS, WIDTH
+from motionloom.core.models.prior import Prior
+from motionloom.core.motion import Motion
 from motionloom.goals import timeline as goal_timeline
 from motionloom.goals.amounts import is_met, measured
 from motionloom.goals.expected import climbs, missing
@@ -29,7 +31,6 @@ from motionloom.goals.sequence import usual_seconds
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
-from motionloom.motion import Motion
 from motionloom.requests.sampling import SOLVER, Sampling, Settings
 from motionloom.tasks.control import control
 from motionloom.tasks.direct_edits import Nod
@@ -41,7 +42,6 @@ from motionloom.tasks.sampling import Progress
 from motionloom.tasks.supported import add_support, lowered
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.tasks.watching import watching
-from motionloom.weights.prior import Prior
 
 TRIES = 6
 """Motions of which the best is kept where numbers are counted; `ATTEMPTS` where the words are plain without numbers."""

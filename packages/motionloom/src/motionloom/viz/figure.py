@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
+from motionloom.core import rotations as rot
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])

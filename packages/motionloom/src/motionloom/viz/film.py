@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageFont
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
 
 MAX_FPS = 60.0
 MAX_GIF_FPS = 25.0

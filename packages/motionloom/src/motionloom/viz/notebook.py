@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from motionloom.motion import Motion
+from motionloom.core.motion import Motion
 from motionloom.viz.figure import Figure, figure
 from motionloom.viz.video import draw_strip
 

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.character import Character
-from motionloom.motion import Motion
 from motionloom.retarget import joints22, to_smpl22
-from motionloom.skeleton import SMPL22
 from motionloom.viz.film import caption
 
 VIEWER = Path(__file__).with_name("viewer.html")

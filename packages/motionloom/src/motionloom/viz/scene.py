@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from motionloom.core.motion import Motion
 from motionloom.io.stream import joined
-from motionloom.motion import Motion
 from motionloom.viz.draw import PAPER, Array, Camera, Colour, mix
 from motionloom.viz.figure import Figure, figure
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
-from motionloom.motion import Motion
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.atomic import atomic_path
+from motionloom.core.motion import Motion
 from motionloom.viz import draw
 from motionloom.viz.draw import Camera, Colour
 from motionloom.viz.figure import Figure, figure

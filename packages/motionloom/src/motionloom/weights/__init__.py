@@ -1,1 +1,1 @@
-"""Weight files: priors, predictors, two-person blocks and adapters, read and written; the shipped ones lie here."""
+"""The weight files that ship, and their cards; `motionloom.core.models` reads them."""

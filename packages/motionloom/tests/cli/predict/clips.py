@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.cli import main
-from motionloom.diffusion import Dct, linear
-from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.motion import Motion
-from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.weights.predictor import Predictor
-from motionloom.weights.prior import Card
+from motionloom.core.diffusion import Dct, linear
+from motionloom.core.features.positions import SMPL_LAYOUT
+from motionloom.core.models.predictor import Predictor
+from motionloom.core.models.prior import Card
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from tests.recorded.graphs import PREDICTORS
 from tests.recorded.tiny_predictor import network
 

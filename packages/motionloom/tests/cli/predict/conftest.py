@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.models.predictor import save_predictor
+from motionloom.core.motion import Motion
 from motionloom.io import stream
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.motion import Motion
 from motionloom.tasks import predict as task
-from motionloom.weights.predictor import save_predictor
 from tests.cli.predict.clips import future, larger, tiny_predictor
 from tests.tasks.test_edit import person
 

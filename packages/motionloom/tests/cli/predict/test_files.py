@@ -9,7 +9,7 @@ import pytest
 from motionloom import io
 from motionloom.cli import futures
 from motionloom.cli import predict as command
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
 from motionloom.io.bvh import read_bvh
 from tests.cli.predict.clips import file_names, run
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.hold import FixedPart
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.skeleton import SMPL22
 from tests.cli.predict.clips import run
 from tests.tasks.test_edit import person
 

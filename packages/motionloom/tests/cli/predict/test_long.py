@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.bvh import read_bvh
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.skeleton import SMPL22
 from tests.cli.predict.clips import file_names, run
 from tests.tasks.test_edit import person
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import main
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.weights.prior import save_prior
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.models.prior import save_prior
 from tests.cli.predict.clips import file_names
 from tests.cli.said import complaint
 from tests.recorded import tiny

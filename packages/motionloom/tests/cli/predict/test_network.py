@@ -3,9 +3,9 @@
 import numpy as np
 
 from motionloom import io
-from motionloom.io.bvh_writer import save_bvh
-from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
+from motionloom.core.files.bvh_writer import save_bvh
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import Skeleton
 from tests.cli.predict.clips import file_names, run
 from tests.tasks.test_edit import person, rig
 

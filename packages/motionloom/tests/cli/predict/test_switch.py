@@ -8,8 +8,8 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.core.skeleton import SMPL22
 from motionloom.io.bvh import read_bvh
-from motionloom.skeleton import SMPL22
 from tests.cli.predict.clips import file_names, run
 from tests.tasks.test_edit import person
 

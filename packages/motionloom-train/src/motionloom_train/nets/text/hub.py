@@ -13,8 +13,8 @@ from typing import Any, Self
 
 import torch
 
-from motionloom.errors import MotionloomError
-from motionloom.runtime.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
+from motionloom.core.errors import MotionloomError
+from motionloom.core.models.networks.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 
 BATCH = 64
 

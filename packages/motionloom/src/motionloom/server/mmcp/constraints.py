@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion, ground_pose
+from motionloom.core.skeleton import SMPL22
 from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.paths import root_path
-from motionloom.motion import Motion, ground_pose
 from motionloom.server.mmcp.rigs import Rig
-from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 

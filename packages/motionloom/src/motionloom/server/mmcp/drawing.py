@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.core.body.feet import planted_feet
+from motionloom.core.errors import MotionloomError
+from motionloom.core.features.layout import FEET
+from motionloom.core.motion import Motion
 from motionloom.edits.fitting import fit
-from motionloom.errors import MotionloomError
-from motionloom.features.layout import FEET
 from motionloom.goals.goal import FPS, Goal, start_of
 from motionloom.goals.segment import Segment
 from motionloom.goals.timeline import Timeline
-from motionloom.kinematics.feet import planted_feet
-from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.requests.tasks import Compose, Edit, Generate
 from motionloom.server.mmcp.constraints import Clock, Goals, as_goal, read_constraints, standing_as, whole_path

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
-from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
+from motionloom.core import rotations as rot
+from motionloom.core.errors import MotionloomError
+from motionloom.core.motion import Motion
+from motionloom.core.skeleton import SMPL22, Skeleton
 from motionloom.retarget import joint_map, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
-from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 MOST_JOINTS = 1000

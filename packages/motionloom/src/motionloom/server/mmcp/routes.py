@@ -9,8 +9,8 @@ from starlette.requests import Request
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.types import Message, Receive, Scope, Send
 
-from motionloom.errors import MotionloomError
-from motionloom.io.text import parse_json
+from motionloom.core.errors import MotionloomError
+from motionloom.core.files.text import parse_json
 from motionloom.server.bodies import body_of
 from motionloom.server.refusal import Refusal
 
