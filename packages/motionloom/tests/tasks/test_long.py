@@ -18,7 +18,8 @@ from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.long import Past, compose, compose_stream, compose_takes, long_features
+from motionloom.tasks.history import Past
+from motionloom.tasks.long import compose, compose_stream, compose_takes, long_features
 from motionloom.tasks.splice import move_rigidly
 from motionloom.tasks.text import sample_features
 from motionloom.tasks.unplaced import compose_unplaced

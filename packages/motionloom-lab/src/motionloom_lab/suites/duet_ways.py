@@ -19,7 +19,7 @@ from motionloom.core.models.networks.pair import PairSession
 from motionloom.core.models.pair import PairBlock
 from motionloom.core.models.prior import Prior, save_prior
 from motionloom.kinematics.physics import Array
-from motionloom.tasks.long import holding_correction
+from motionloom.tasks.history import holding_correction
 from motionloom.tasks.pair import PairEdits, pair_features, person_seeds
 from motionloom.tasks.people import known_state
 from motionloom.tasks.text import STEPS

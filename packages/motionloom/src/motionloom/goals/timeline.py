@@ -4,7 +4,6 @@
 them as a JSON Schema.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -35,7 +34,7 @@ from motionloom.goals.seconds import flights
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.goals.sequence import Part, lengths, split_actions, usual_seconds
 from motionloom.goals.verbs import in_plainer_words, subject_of
-from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, line_of, lined_of, parse_lined, read_lined
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
 from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
@@ -439,7 +438,7 @@ class _Reader(LinedFile):
         try:
             return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent, metre=self.metre)
         except MotionloomError as error:
-            self.fail(_line(node, str(error)), f"{name}: {error}")
+            self.fail(line_of(node, str(error)), f"{name}: {error}")
 
     def start(self, node: Lined | None) -> Path | None:
         if node is None:
@@ -465,19 +464,3 @@ class _Reader(LinedFile):
 
     def kind(self, node: Lined) -> str:
         return "an empty list" if node.value == [] else node.kind
-
-
-def _line(node: Lined, message: str) -> int:
-    """The line of what a message names as ``'joints[1].points[3].time'``; that of the whole where it names none."""
-    named = re.match(r"'([\w.\[\]]+)' ", message)
-    line = node.key_line or node.line
-    for step in re.findall(r"\w+", named[1]) if named else ():
-        inner = node.value
-        if isinstance(inner, dict) and step in inner:
-            node = inner[step]
-        elif isinstance(inner, list) and step.isdecimal() and int(step) < len(inner):
-            node = inner[int(step)]
-        else:
-            return line
-        line = node.key_line or node.line
-    return line

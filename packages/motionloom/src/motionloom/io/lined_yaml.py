@@ -208,3 +208,19 @@ def _scalar(event: Any, path: Path | str, line: int) -> bool | int | float | str
     if abs(value) > 1e300:
         fail(path, line, f"{shown(text)} is too large a number")
     return value
+
+
+def line_of(node: Lined, message: str) -> int:
+    """The line of what a message names as ``'joints[1].points[3].time'``; that of the whole where it names none."""
+    named = re.match(r"'([\w.\[\]]+)' ", message)
+    line = node.key_line or node.line
+    for step in re.findall(r"\w+", named[1]) if named else ():
+        inner = node.value
+        if isinstance(inner, dict) and step in inner:
+            node = inner[step]
+        elif isinstance(inner, list) and step.isdecimal() and int(step) < len(inner):
+            node = inner[int(step)]
+        else:
+            return line
+        line = node.key_line or node.line
+    return line

@@ -37,7 +37,7 @@ from motionloom.live.course import (
     within_reach,
 )
 from motionloom.live.settings import Settings
-from motionloom.tasks.long import last_frames
+from motionloom.tasks.history import last_frames
 
 Array = NDArray[np.float64]
 

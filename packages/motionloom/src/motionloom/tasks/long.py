@@ -20,14 +20,12 @@ from numpy.typing import NDArray
 
 from motionloom.core.diffusion import lerp
 from motionloom.core.errors import MotionloomError
-from motionloom.core.features.layout import FPS
 from motionloom.core.features.placed import PlacedMotion
 from motionloom.core.ground import GroundPose
 from motionloom.core.models.networks.prior import PriorSession
 from motionloom.core.models.networks.prior_condition import Bound
 from motionloom.core.models.prior import Prior
 from motionloom.core.motion import Motion
-from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
@@ -36,8 +34,9 @@ from motionloom.requests.sampling import Sampling, Settings
 from motionloom.tasks.adapting import adapted_priors, load_adapters
 from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.choosing import best_in_words
+from motionloom.tasks.history import Past, holding_correction
 from motionloom.tasks.sampling import Moves, Network, eased, sample_chain
-from motionloom.tasks.splice import concatenate, person_at_20
+from motionloom.tasks.splice import concatenate
 from motionloom.tasks.text import check_humanml, placed_positions
 from motionloom.tasks.watching import ChainView
 
@@ -45,8 +44,6 @@ Array = NDArray[np.float64]
 
 BATCH = 16
 """Rows in one network call."""
-LOOK_BACK = 20
-"""Frames of an older motion that a new one continues from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,58 +384,6 @@ def zero_padded(array: np.ndarray, length: int, *, axis: int = -2) -> np.ndarray
 
 
 # Into the world
-
-
-@dataclass(frozen=True, eq=False)
-class Past:
-    """The end of a motion that a long one goes on from."""
-
-    known: np.ndarray
-    """(frames, 263) features of its last frames, not standardised."""
-    end: GroundPose
-    """Where the person is one frame behind them: at frame 0 of what follows."""
-    behind: np.ndarray | None = None
-    """(frames, 263) features of the frames that follow the long motion; None: nothing follows it."""
-    lead: int = 0
-    """Frames that the first piece has more, before its segment begins."""
-    trail: int = 0
-    """Frames that the last piece has more, behind the end of its segment."""
-
-    @staticmethod
-    def of(motion: Motion) -> "Past":
-        """Of anybody's motion, as of `last_frames`."""
-        placed = last_frames(motion)
-        return Past(placed.features, placed.end)
-
-
-def last_frames(motion: Motion) -> PlacedMotion:
-    """The `LOOK_BACK` last frames at 20 per second of anybody's motion; raises `MotionloomError` for a shorter one."""
-    positions = person_at_20(motion)
-    if len(positions) <= LOOK_BACK:
-        raise MotionloomError(
-            f"the motion to go on from is {motion.seconds:.2f} s long; at least {LOOK_BACK / FPS:g} s are needed"
-        )
-    return PlacedMotion.of(positions[-LOOK_BACK - 1 :])
-
-
-def holding_correction(own: np.ndarray, prior: Prior, length: int, *, last: bool = False) -> Correction:
-    """Sets the first frames of a row's estimate (or the last ones) to known ones, the others join them without a jump.
-
-    own: (frames, 263) features, not standardised. length: frames of the row.
-    """
-    first, end = (0, length - len(own)) if last else (len(own), length)
-    held = slice(end, None) if last else slice(0, first)
-    known = np.zeros((1, length, own.shape[1]), own.dtype)
-    known[:, held] = own
-    mask = np.zeros(known.shape, np.bool_)
-    mask[:, held] = True
-    meet = joining(known, mask, first, end)
-
-    def hold(clean: np.ndarray, level: int) -> np.ndarray:
-        features = np.where(mask, known, clean * prior.spread + prior.mean)
-        return ((meet(features) - prior.mean) / prior.spread)[0]
-
-    return hold
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ from motionloom.goals.roles import prompts_of
 from motionloom.requests.sampling import PairSampling, PairSettings, Seed
 from motionloom.requests.shared import LONGEST
 from motionloom.tasks.choosing import best_in_words
-from motionloom.tasks.long import holding_correction
+from motionloom.tasks.history import holding_correction
 from motionloom.tasks.people import Duet, PairPast, finish_person, known_state
 from motionloom.tasks.sampling import Batch, Progress, Rows, sample
 from motionloom.tasks.text import check_goal_length, check_humanml, frames_in

@@ -33,6 +33,7 @@ from motionloom.tasks.other_joints import arrive, future_pieces, on_joints_of, s
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
     apply_positions,
+    check_like,
     concatenate,
     continue_motion,
     ground_pose_at,
@@ -435,21 +436,6 @@ def _moved_to_past(past: Motion, source: Motion) -> Motion:
     if radians < NEAR[1] and metres < NEAR[0]:
         return source
     return move_on_floor(source, begin, replace(end, x=2 * end.x - before.x, z=2 * end.z - before.z))
-
-
-def check_like(past: Motion, other: Motion, what: str) -> None:
-    """Raise MotionloomError unless both are of one skeleton and rate, and both with or without moving bones."""
-    if other.skeleton != past.skeleton:
-        raise MotionloomError(
-            f"the {what} has another skeleton ({len(other.skeleton)} joints, the past {len(past.skeleton)}); "
-            "retarget it to the past's first"
-        )
-    if (other.translations is None) != (past.translations is None):
-        raise MotionloomError(
-            f"the {what} and the past must both have bones of constant length, or both have moving ones"
-        )
-    if abs(other.fps - past.fps) > 1e-3 * past.fps:
-        raise MotionloomError(f"the {what} has {other.fps:g} fps and the past {past.fps:g}; resample it first")
 
 
 def _check_parts(hold: FixedJoints, seconds: float) -> None:

@@ -29,7 +29,8 @@ from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.body import Places, join_places
-from motionloom.tasks.long import LOOK_BACK, Past, Track, long_features, place_pieces, segments_on
+from motionloom.tasks.history import LOOK_BACK, Past
+from motionloom.tasks.long import Track, long_features, place_pieces, segments_on
 from motionloom.tasks.sampling import Moves
 from motionloom.tasks.splice import concatenate, move_on_floor, splice
 

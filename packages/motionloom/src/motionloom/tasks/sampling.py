@@ -6,7 +6,7 @@ edits of the denoiser (goals, boundaries, the other person) and what it has `Obs
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, Self, TypeAlias, TypeVar
+from typing import Any, Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -106,8 +106,8 @@ def sample(
     """Standardised states (tokens, features) with their rows' numbers, each as soon as its batch is finished.
 
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. guided: the guided
-    denoiser of all rows, where it is not that of the network alone. edits: of each
-    batch's guided denoiser, after the observed part is inserted, the first one first. halfway: stop after half of the
+    denoiser of all rows, where it is not that of the network alone. edits: of each batch's guided denoiser, after the
+    observed part is inserted, the first one first. halfway: stop after half of the
     calls and give the denoised estimates. corrected: rows of one length are given `Prior.smoothed`, with what is
     observed in its place, and through the edits once more, at level 0. view: how each network call is seen by who is
     `watching`; None: nobody can.
@@ -118,17 +118,8 @@ def sample(
     if sampling.best_of > 1 and not halfway:
         people, total = view.people if view else 1, len(_batches(prior, rows, sampling)) * (len(way) - 1)
         choosing, progress = _split_progress(progress, of=total)
-        rows = with_best_seeds(
-            prior,
-            rows,
-            sampling,
-            network=network,
-            edits=edits,
-            observed=observed,
-            people=people,
-            progress=choosing,
-            choose=choose,
-        )
+        more: dict[str, Any] = {"network": network, "edits": edits, "observed": observed, "people": people}
+        rows = with_best_seeds(prior, rows, sampling, progress=choosing, choose=choose, **more)
     batches, calls = _batches(prior, rows, sampling), 0
     if halfway:
         way = way[: len(way) // 2 + 1]

@@ -13,6 +13,7 @@ from motionloom.core import rotations as rot
 from motionloom.core.blending import smoothstep
 from motionloom.core.body.feet import clean_feet
 from motionloom.core.body.ik import motion_from_positions
+from motionloom.core.errors import MotionloomError
 from motionloom.core.features.humanml import positions_at, resample_positions
 from motionloom.core.features.layout import FPS
 from motionloom.core.features.placed import PlacedMotion
@@ -192,3 +193,18 @@ def _eased_places(old: Array, new: Array, first: int, last: int, ease: int) -> A
             slope = lack[border] - lack[border - step]
             result[border + step * np.arange(1, ease + 1)] += match_boundary(np.zeros(3), slope, ease)
     return result
+
+
+def check_like(past: Motion, other: Motion, what: str) -> None:
+    """Raise MotionloomError unless both are of one skeleton and rate, and both with or without moving bones."""
+    if other.skeleton != past.skeleton:
+        raise MotionloomError(
+            f"the {what} has another skeleton ({len(other.skeleton)} joints, the past {len(past.skeleton)}); "
+            "retarget it to the past's first"
+        )
+    if (other.translations is None) != (past.translations is None):
+        raise MotionloomError(
+            f"the {what} and the past must both have bones of constant length, or both have moving ones"
+        )
+    if abs(other.fps - past.fps) > 1e-3 * past.fps:
+        raise MotionloomError(f"the {what} has {other.fps:g} fps and the past {past.fps:g}; resample it first")
