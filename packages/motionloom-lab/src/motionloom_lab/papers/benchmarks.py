@@ -82,7 +82,7 @@ def read_retargeted(path: Path | str, *, splits: tuple[str, ...] = SPLITS) -> Pr
     joints = H36M_LAYOUT.joints
     clips = array.reshape(tuple(n for n in array.shape if n > 1)) if array.ndim > 4 else array
     clips = clips[None] if clips.ndim == 3 else clips
-    if clips.ndim != 4 or clips.shape[1] < H36M_FRAMES or not len(clips) or "test" not in splits:
+    if clips.ndim != 4 or not len(clips) or len(clips[0]) < H36M_FRAMES or "test" not in splits:
         raise MotionloomError(
             f"{path} is an array of the shape {array.shape}, and must be (clips, {H36M_FRAMES} or more, {joints}, 3): "
             "it is tested on, and holds nothing to train on"
