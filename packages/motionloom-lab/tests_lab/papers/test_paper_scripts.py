@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from motionloom.core.models.predictor import save_predictor
+from tests_lab.data import test_pairs
+from tests_lab.data import test_processed_3dpw as processed
 from tests_lab.suites.test_prediction_joints import of_h36m, retargeted
 
 PAPERS = Path(__file__).resolve().parents[4] / "examples" / "papers"
@@ -52,3 +54,13 @@ def test_tables_of_humanmac(tmp_path: Path) -> None:
     assert (tmp_path / "table1" / "report.md").is_file()
     for number, name in enumerate(("coefficients", "layers", "schedules", "noising", "", "dct"), start=2):
         assert not name or (tmp_path / f"table{number}" / f"{name}.md").is_file()
+
+
+@pytest.mark.slow
+def test_table_3_of_processed_3dpw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    people = test_pairs.walkers(seconds=6.0)
+    monkeypatch.setattr(processed, "walkers", lambda: people)
+    folder = processed.write(processed.write(tmp_path / "3dpw"), "arguing", "validation")
+    small = {"TRAIN": "steps=2 batch=2 warmup=1 save_every=2", "DEPTHS": "2", "LAYERS": "2", "MRT": "2"}
+    sh("table3.sh", folder, tmp_path / "out", **small, MEASURE="--crops 2 --steps 2 --samples 1")
+    assert list((tmp_path / "out" / "table3").rglob("report.md"))
