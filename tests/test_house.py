@@ -78,8 +78,8 @@ OVER = {
     "train/cli": 304,
     "(top)": 251,
 }
-"""Rooms that are over their budget, and their size: these numbers only go down, and a room within its budget is taken out
-of the list."""
+"""Rooms that are over their budget, and their size: these numbers only go down, and a room within its budget leaves the
+list."""
 
 
 def run(*command: str) -> subprocess.CompletedProcess[str]:
