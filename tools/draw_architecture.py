@@ -22,8 +22,8 @@ DOORS = (
 STEPS = (
     ("request", "requests/", "checked values"),
     ("plan", "tasks/run.py", "files read"),
-    ("sample", "tasks/sampling.py, diffusion/", "noise to features"),
-    ("body", "features/, kinematics/, edits/", "features to people"),
+    ("sample", "tasks/sampling.py, core/diffusion/", "noise to features"),
+    ("body", "core/features/, core/body/, edits/", "features to people"),
     ("write", "io/, viz/, retarget/", "people to files"),
 )
 WIDTH, ROW, BOX = 860, 34, 126

@@ -177,7 +177,7 @@ def _double_take(arguments: Namespace, prior: Prior, timeline: Timeline, samplin
         rows_of([round(segment.seconds * prior.fps) for segment in timeline.segments], handshake),
         mode="published" if arguments.method.endswith("published") else "paper",
         handshake=handshake,
-        seed=sampling.seed,
+        seed=sampling.seeds(1)[0],
         steps=sampling.steps,
         guidance=sampling.guidance,
         **settings,

@@ -53,7 +53,7 @@ def parse_json(data: bytes | str, what: Path | str) -> Any:
     """
     value = _json(data, what, unique=True)
     try:
-        check_texts(value, "a text")
+        check_texts(value, "it")
     except MotionloomError as error:
         raise MotionloomError(f"{what}: {error}") from None
     return value

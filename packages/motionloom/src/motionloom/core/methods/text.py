@@ -57,7 +57,7 @@ def text_to_motion(
         prior: The weights.
         prompts: One per motion.
         frames: The length of all of them, at the prior's frame rate.
-        seeds: One per motion, from 0 to below 2**62; a motion depends on its own prompt and seed alone.
+        seeds: One per motion, 0 or more and below `LARGEST_SEED`; a motion depends on its own prompt and seed alone.
         walk: How noise is taken away.
 
     Returns:
