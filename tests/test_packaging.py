@@ -277,7 +277,7 @@ def test_every_source_of_a_weight_file_is_named_in_its_card_and_in_the_notice(fi
 @pytest.mark.parametrize("family", FAMILIES)
 def test_families_name_the_commands_of_their_tables(family: str) -> None:
     """So that only the table is read that has the command of the line."""
-    assert list(read_table("motionloom.cli", f"{family}.toml")) == FAMILIES[family]
+    assert list(read_table("motionloom.cli", f"{family}.toml")) == list(FAMILIES[family])
 
 
 @pytest.mark.parametrize("name", PACKAGES)
