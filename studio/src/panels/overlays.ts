@@ -32,7 +32,7 @@ export function notices(app: App, retry: () => void, settle: (choice: Choice) =>
         ? [
             h(
               "p",
-              { class: "notice told", role: "alert" },
+              { class: "notice told", role: told.endsWith("…") ? "status" : "alert" },
               h("span", {}, told),
               h(
                 "button",

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,13 @@ SMALL = "--windows 1 --samples 2 --steps 2 --published-steps 2"
 def sh(name: str, *words: Path | str, **settings: str) -> None:
     """Run a script with its settings; its last lines are shown where it fails."""
     line = ["sh", str(PAPERS / name), *map(str, words)]
-    done = subprocess.run(line, env=os.environ | settings, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        line,
+        env=os.environ | settings | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, (done.stdout + done.stderr)[-2000:]
 
 

@@ -86,7 +86,8 @@ def ended_by(number: int, ended: Ended) -> bool:
     """Whether the command ended as this signal ends commands, with one sentence."""
     if number == signal.SIGKILL:
         return ended.code == -signal.SIGKILL
-    return ended.code == 130 and ended.said.count("\n") <= 1 and "Traceback" not in ended.said
+    sentences = [line for line in ended.said.splitlines() if not line.startswith("note:")]
+    return ended.code == 130 and len(sentences) <= 1 and "Traceback" not in ended.said
 
 
 def uninterrupted(words: Sequence[str], folder: Path) -> Ended:

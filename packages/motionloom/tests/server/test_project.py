@@ -271,7 +271,10 @@ def test_a_mistake_in_a_timeline_is_reported_with_its_place(server: Server) -> N
     status, answer = server.json("POST", "/timeline.json", b"segments:\n  - text: a person walks\n    secnds: 3\n")
     assert (status, answer["error"].startswith("the timeline, line 3: unknown key 'secnds'")) == (400, True)
     status, answer = server.json("POST", "/timeline.json", b"segments: [a\0]")
-    assert (status, answer["error"]) == (400, "the timeline is not a text file: it holds binary data")
+    assert (status, answer["error"]) == (
+        400,
+        "the timeline holds the control character U+0000, which is no text; leave it out",
+    )
     assert not list((server.project / "motions").glob("*.yaml"))
     assert not list((server.project / "motions").glob(".*.yaml"))
 

@@ -50,7 +50,7 @@ def test_blocks_are_selected_with_control_shift_and_a_frame(four: Studio):
     x = block(four, 1)[0]
     four.drag((x, top), (x + 60, top - 30), (block(four, 2)[0], block(four, 2)[1]))
     assert chosen(four) == [1, 2]
-    four.page.mouse.click(left + 100, top)
+    four.page.mouse.click(left + 300, top)
     assert chosen(four) == []
     four.key("Control+a")
     assert chosen(four) == [0, 1, 2, 3]

@@ -88,7 +88,10 @@ def test_the_stick_of_a_gamepad_steers(studio: Studio):
 @pytest.mark.slow
 def test_a_server_that_has_no_live_mode_is_said_on_the_page(studio: Studio):
     studio.page.evaluate(
-        "window.WebSocket = class extends WebSocket { constructor(place) { super(place.replace('/live', '/none')) } }"
+        """() => {
+            const plain = WebSocket;
+            window.WebSocket = class extends plain { constructor(place) { super(place.replace('/live', '/none')) } };
+        }"""
     )
     studio.key("j")
     studio.until("document.querySelector('#live p.unmet')?.textContent.includes('does not answer')")

@@ -10,7 +10,7 @@ from tests.studio.studio import Studio
 
 LEFT_SHOULDER, RIGHT_SHOULDER, LEFT_WRIST, RIGHT_WRIST, HEAD = 16, 17, 20, 21, 15
 DEEDS = {
-    "a person walks, turns around and waves": ("walks", "turns 1"),
+    "a person walks, turns around and waves": ("walks", "turns 2", "waves"),
     "a person walks forward, then sits down": ("walks", "ends sitting"),
     "a person picks something up off the floor and walks on": ("bows once", "walks"),
     "a child skips along happily": ("hops on one leg", "forward"),

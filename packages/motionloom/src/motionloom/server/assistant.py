@@ -80,8 +80,11 @@ class Assistant:
         """A function that generates motion by a task's request, with its fields as arguments."""
 
         async def call(**fields: Any) -> Any:
-            check_texts(fields, task)
-            return await self._results({"task": task} | fields)
+            async def checked() -> Any:
+                check_texts(fields, task)
+                return await self._results({"task": task} | fields)
+
+            return await _or_refusal(checked())
 
         known = narrow_fields(REQUESTS[task], most(task, self.worker.limits))
         call.__name__ = "generate_motion" if task == "generate" else task
