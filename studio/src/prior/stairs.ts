@@ -77,12 +77,11 @@ function onStairs(body: Body, places: readonly Vec[][]): Body {
   return fitBody({ ...body, root: body.root.map((at, f) => add(at, [0, lift[f]!, 0])) }, wanted);
 }
 
-/** Lowered by as much as the lowest joint is above the floor, a quarter of a second averaged. */
+/** Lowered by as much as the lowest joint is above the floor, a quarter of a second averaged, and not into the floor. */
 function grounded(body: Body, places: readonly Vec[][]): Body {
-  const drop = averaged(
-    lowest(places).map((y) => Math.max(y, 0)),
-    odd(body.fps / 4),
-  );
+  const above = Array.from(lowest(places), (y) => Math.max(y, 0));
+  const mean = averaged(above, odd(body.fps / 4));
+  const drop = above.map((y, f) => Math.min(mean[f]!, y));
   return cleanFeet({ ...body, root: body.root.map((at, f) => add(at, [0, -drop[f]!, 0])) }, null);
 }
 
