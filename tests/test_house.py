@@ -60,7 +60,7 @@ OVER = {
     "train/data": 6_996,
     "goals": 5_978,
     "io": 5_629,
-    "server": 5_464,
+    "server": 5_467,
     "cli": 5_321,
     "train/(top)": 4_466,
     "bulk": 4_359,
