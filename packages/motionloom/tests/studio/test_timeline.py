@@ -142,7 +142,7 @@ def test_somebody_stands_in_an_empty_block_and_the_others_are_drawn(studio: Stud
     assert studio.page.locator(".block.wrong, .track.words .said").count() == 0
 
 
-def test_the_sheet_of_keys_fits_the_window_and_no_key_covers_its_words(studio: Studio):
+def test_the_sheet_of_keys_is_as_wide_as_the_window_and_no_key_covers_its_words(studio: Studio):
     studio.key("?")
     sheet = studio.page.locator("#help")
     assert sheet.evaluate("one => one.scrollWidth <= one.clientWidth"), "nothing of it is cut"
